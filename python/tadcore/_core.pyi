@@ -1,0 +1,149 @@
+"""The compiled core. Everything here is reduced (one Kronecker factor); `tadcore` wraps it."""
+
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+@final
+class Game:
+    """Weights, horizon and grid; owns the equilibrium and the (step, topology) table."""
+
+    def __new__(
+        cls,
+        *,
+        interaction: Literal["I1", "I2"],
+        horizon: float,
+        step: float,
+        defender_control_weight: NDArray[np.float64],
+        target_control_weight: float,
+        attacker_control_weight: float,
+        defender_running_weight: NDArray[np.float64] | None = None,
+        defender_terminal_weight: NDArray[np.float64] | None = None,
+        target_running_weight: float = 1.0,
+        target_terminal_weight: float = 1.0,
+        attacker_target_running_weight: float = 1.0,
+        attacker_target_terminal_weight: float = 1.0,
+        evasion_running_weight: NDArray[np.float64],
+        evasion_terminal_weight: NDArray[np.float64],
+        evasion: float = 1.0,
+        synthesis_weights: NDArray[np.float64],
+        table_bytes: int | None = None,
+    ) -> Game: ...
+    @property
+    def defenders(self) -> int: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def times(self) -> NDArray[np.float64]: ...
+    def equilibrium(self) -> Equilibrium: ...
+    def synthesize(
+        self,
+        step: int,
+        adjacency: NDArray[np.bool_],
+        *,
+        method: Literal["newton", "descent"] = "newton",
+        max_iterations: int | None = None,
+    ) -> Gains: ...
+    def simulate(
+        self,
+        positions: NDArray[np.float64],
+        visibility_radii: NDArray[np.float64],
+        capture_radii: NDArray[np.float64],
+    ) -> Record: ...
+    def simulate_batch(
+        self,
+        positions: NDArray[np.float64],
+        visibility_radii: NDArray[np.float64],
+        capture_radii: NDArray[np.float64],
+        *,
+        threads: int | None = None,
+    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64]]: ...
+    def table(self) -> dict[str, int]: ...
+
+@final
+class Equilibrium:
+    """P on the grid: groups ["defenders", "target", "attacker"] in I1, ["team"] in I2."""
+
+    @property
+    def groups(self) -> list[str]: ...
+    @property
+    def P(self) -> NDArray[np.float64]: ...
+    """(groups, K+1, N, N), read-only."""
+    @property
+    def steps(self) -> int: ...
+    """Accepted steps of the integrator."""
+    def residual(self) -> NDArray[np.float64]: ...
+    """(groups, K+1): relative Riccati residual at each node."""
+    def feedback(self) -> NDArray[np.float64]: ...
+    """(K+1, N+1, N): FNE feedback rows d1…dn, target, attacker: u = row @ z."""
+
+@final
+class Gains:
+    """The gains at one (instant, topology)."""
+
+    @property
+    def rows(self) -> NDArray[np.float64]: ...
+    """(m, N): u_i = rows[i] @ z."""
+    @property
+    def K(self) -> NDArray[np.float64]: ...
+    """(m, N): the paper's scalar block factors, K_i 𝓘_i = rows[i]; zero on players not seen."""
+    @property
+    def theta(self) -> float: ...
+    @property
+    def terms(self) -> NDArray[np.float64]: ...
+    """Unweighted squared norms, four in I1, three in I2; theta = γ · terms."""
+    @property
+    def gradient_norm(self) -> float: ...
+    """Relative."""
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def status(self) -> str: ...
+    @property
+    def certified(self) -> bool: ...
+    """Whether the minimum is proved to be global."""
+
+@final
+class Record:
+    """One recorded run; L = steps taken, rows 0…L, the last the terminal state."""
+
+    @property
+    def kind(self) -> int: ...
+    @property
+    def defender(self) -> int: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def times(self) -> NDArray[np.float64]: ...
+    @property
+    def position(self) -> NDArray[np.float64]: ...
+    """(L+1, n+2, dim)."""
+    @property
+    def control(self) -> NDArray[np.float64]: ...
+    """(L+1, n+2, dim); the last row under the network of the last step."""
+    @property
+    def adjacency(self) -> NDArray[np.bool_]: ...
+    """(L+1, m, N): row i, entry j ≠ i player j, entry i the attacker; the last row repeats the last network in force."""
+    @property
+    def gains(self) -> NDArray[np.float64]: ...
+    """(L+1, m, N)."""
+    @property
+    def theta(self) -> NDArray[np.float64]: ...
+    @property
+    def theta_terms(self) -> NDArray[np.float64]: ...
+    """(L+1, 4 or 3), unweighted."""
+    @property
+    def costs(self) -> NDArray[np.float64]: ...
+    """J_d, J_τ, J_a over [0, time] in I1; the zero-sum J in I2."""
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def unconverged(self) -> int: ...
+    """Instants whose synthesis stopped short of the tolerance."""
+
+def information_matrix(row: NDArray[np.bool_], player: int) -> Any: ...

@@ -1,0 +1,5 @@
+//! Bindings.
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _core {}

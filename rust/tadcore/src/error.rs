@@ -1,0 +1,88 @@
+//! What can go wrong, one enum per layer, each variant with the numbers a reader needs.
+//!
+//! A *programming or input* error is an `Err`; the *outcome of a solve* (converged, iteration limit, …) is a
+//! status inside an `Ok`. There is no catch-all variant.
+
+use thiserror::Error;
+
+/// A game, a position or a radius that cannot be accepted.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum GameError {
+    /// A number that breaks its rule.
+    #[error("{field} is {value}, but it must be {rule}")]
+    Value {
+        /// The field, in the words of the scenario.
+        field: String,
+        /// The number found.
+        value: f64,
+        /// What it must be.
+        rule: &'static str,
+    },
+    /// An array of the wrong length.
+    #[error("{field} has {found} entries, but it must have {expected}")]
+    Length {
+        /// The field, in the words of the scenario.
+        field: &'static str,
+        /// Entries found.
+        found: usize,
+        /// Entries needed.
+        expected: usize,
+    },
+    /// The step does not divide the horizon.
+    #[error("step is {step}, but it must divide the horizon {horizon} into a whole number of steps")]
+    Grid {
+        /// T.
+        horizon: f64,
+        /// δ.
+        step: f64,
+    },
+}
+
+/// The Riccati equations could not give an equilibrium.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum EquilibriumError {
+    /// The solution escapes to infinity inside the horizon: the game has no feedback Nash equilibrium on [0, T].
+    #[error(
+        "no feedback Nash equilibrium on [0, {horizon}]: the Riccati solution escapes {escape_time} before the horizon; \
+         an equilibrium exists for every horizon shorter than that"
+    )]
+    FiniteEscape {
+        /// Time before the horizon at which the solution escapes (backward time): the supremum of the horizons for
+        /// which an equilibrium exists.
+        escape_time: f64,
+        /// T.
+        horizon: f64,
+    },
+    /// The integrator used up its budget of steps.
+    #[error("the Riccati integrator took {steps} steps and came only {reached} of {horizon} back from the horizon")]
+    StepBudget {
+        /// Steps taken.
+        steps: usize,
+        /// Backward time reached.
+        reached: f64,
+        /// T.
+        horizon: f64,
+    },
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The caller asked to stop, by the [`crate::cancel::CancelToken`] it passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("cancelled by the caller")]
+pub struct Cancelled;
+
+/// A run or a batch could not be done.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RunError {
+    /// Bad positions or radii.
+    #[error(transparent)]
+    Game(#[from] GameError),
+    /// No equilibrium.
+    #[error(transparent)]
+    Equilibrium(#[from] EquilibriumError),
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

@@ -1,0 +1,5 @@
+//! tadcore: target-attacker-defender differential games with limited observations.
+pub mod cancel;
+pub mod error;
+pub mod game;
+pub mod riccati;
