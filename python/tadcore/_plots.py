@@ -15,20 +15,20 @@ class Plots:
     def __init__(self, run: Run) -> None:
         self._run = run
 
-    def trajectories(self, **options: Any) -> Any:
+    def trajectories(self, *arguments: Any, **options: Any) -> Any:
         """Paths in the plane or in space, with capture discs and a mark where a link forms."""
-        return self._draw("trajectories", options)
+        return self._draw("trajectories", arguments, options)
 
-    def network(self, **options: Any) -> Any:
+    def network(self, *arguments: Any, **options: Any) -> Any:
         """The visibility graph, one panel for each interval, the new edge emphasised."""
-        return self._draw("network", options)
+        return self._draw("network", arguments, options)
 
-    def controls(self, **options: Any) -> Any:
+    def controls(self, *arguments: Any, **options: Any) -> Any:
         """Controls along one axis, with dashed verticals at network changes."""
-        return self._draw("controls", options)
+        return self._draw("controls", arguments, options)
 
-    def _draw(self, name: str, options: dict[str, Any]) -> Any:
-        return getattr(import_module("tadcore.plotting"), name)(self._run, **options)
+    def _draw(self, name: str, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
+        return getattr(import_module("tadcore.plotting"), name)(self._run, *arguments, **options)
 
     def __repr__(self) -> str:
         return "trajectories(), network(), controls()"
