@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import Annotated, Any, TypeAlias, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
@@ -17,17 +17,23 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from .errors import MISSING, ScenarioError
 
-if TYPE_CHECKING:
-    from typing import TypeAlias
-
-Location: TypeAlias = "tuple[str | int, ...]"
-Problem: TypeAlias = "tuple[Location, object, str]"
+Location: TypeAlias = tuple[str | int, ...]
+Problem: TypeAlias = tuple[Location, object, str]
 """Where (relative to the field that refuses), what was found, and what it must be."""
+
+
+class _Problems(tuple[Problem, ...]):
+    """Problems on their way through pydantic, which prints what it carries: a value may be too long for that."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"{len(self)} problems"
 
 
 def refusal(problems: Iterable[Problem]) -> PydanticCustomError:
     """An error that pydantic carries outward and `scenario_error` unfolds."""
-    found = tuple(problems)
+    found = _Problems(problems)
     return PydanticCustomError(
         "tadcore", "must be {rules}", {"problems": found, "rules": "; ".join(rule for _, _, rule in found)}
     )
@@ -117,11 +123,11 @@ def is_team(value: object) -> object:
     return value
 
 
-Positive = Annotated[float, BeforeValidator(is_positive), Field(gt=0.0)]
-Radius = Annotated[float, BeforeValidator(is_radius), Field(gt=0.0)]
-Fraction = Annotated[float, BeforeValidator(is_fraction), Field(ge=0.0, le=1.0)]
-Position = Annotated[tuple[float, ...], BeforeValidator(is_position), Field(min_length=2, max_length=3)]
-Gamma = Annotated[tuple[float, ...], BeforeValidator(is_gamma), Field(min_length=3, max_length=4)]
+Positive = Annotated[float, Field(gt=0.0), BeforeValidator(is_positive)]
+Radius = Annotated[float, Field(gt=0.0), BeforeValidator(is_radius)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0), BeforeValidator(is_fraction)]
+Position = Annotated[tuple[float, ...], Field(min_length=2, max_length=3), BeforeValidator(is_position)]
+Gamma = Annotated[tuple[float, ...], Field(min_length=3, max_length=4), BeforeValidator(is_gamma)]
 
 
 def path_of(location: Location, root: str = "") -> str:
@@ -178,6 +184,8 @@ def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str) -> list[Sce
         return [ScenarioError(field, detail["input"], str(detail["ctx"]["expected"]).replace("'", '"'))]
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return [ScenarioError(field, detail["input"], "a table of fields")]
+    if kind == "frozen_instance":
+        return [ScenarioError(field, detail["input"], "left as it is: scenarios are immutable, use replace")]
     if kind == "json_invalid":
         return [ScenarioError(field, detail["input"], f"valid JSON ({detail['ctx']['error']})")]
     rule = detail["msg"].removeprefix("Input should be ")

@@ -46,6 +46,14 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
     _root: ClassVar[str] = ""
     """What the path of a field starts with when this model stands alone."""
 
+    if not TYPE_CHECKING:  # a type checker knows that the fields are frozen
+
+        def __setattr__(self, name: str, value: object) -> None:
+            try:
+                super().__setattr__(name, value)
+            except ValidationError as error:
+                raise _translate(type(self), error) from None
+
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
         """Validate a dict or an instance; raises `ScenarioError`."""

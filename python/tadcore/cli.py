@@ -85,12 +85,12 @@ def simulate(
     With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
     --plot also the figures, as PNG and PDF.
     """
-    from .simulation import simulate as play
-
+    sc = _load(scenario)
     _usable(out)
     if plot and out is None and not _has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
-    sc = _load(scenario)
+    from .simulation import simulate as play
+
     run = play(sc)
     for line in _lines(run):
         say(line)

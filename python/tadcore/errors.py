@@ -161,4 +161,5 @@ def _shorten(value: object) -> str:
     try:
         return _reader.repr(tolist() if callable(tolist) else value)
     except Exception:  # an integer past Python's limit of printed digits, an object whose repr is broken
-        return f"<{type(value).__name__}>"
+        long = f"an integer of {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else None
+        return long or f"<{type(value).__name__}>"

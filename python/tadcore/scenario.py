@@ -124,7 +124,7 @@ class Scenario(CheckedModel):
     attacker: Attacker = Field(description="the [attacker] table")
     target: Target = Field(description="the [target] table")
     defenders: Annotated[tuple[Defender, ...], BeforeValidator(is_team)] = Field(
-        min_length=1, description="one [[defenders]] table for each defender"
+        json_schema_extra={"minItems": 1}, description="one [[defenders]] table for each defender"
     )
 
     @model_validator(mode="after")
