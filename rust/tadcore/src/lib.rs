@@ -2,4 +2,6 @@
 pub mod cancel;
 pub mod error;
 pub mod game;
+pub mod network;
 pub mod riccati;
+pub mod synthesis;
