@@ -189,8 +189,8 @@ def assert_labels_apart(figure):
         for (name, box), (other, against) in combinations(boxes, 2):
             assert not box.overlaps(against), f"{name} overlaps {other}"
         for name, box in boxes:
-            assert sheet.x0 <= box.x0 and box.x1 <= sheet.x1, f"{name} is cut off"
-            assert sheet.y0 <= box.y0 and box.y1 <= sheet.y1, f"{name} is cut off"
+            within = sheet.x0 <= box.x0 and box.x1 <= sheet.x1 and sheet.y0 <= box.y0 and box.y1 <= sheet.y1
+            assert within, f"{name} is cut off"
 
 
 @pytest.mark.parametrize("name", paper.FIGURES)
