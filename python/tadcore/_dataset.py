@@ -16,6 +16,7 @@ from ._files import write_whole
 from .synthesis import theta_terms
 
 if TYPE_CHECKING:
+    from .network import Edge
     from .scenario import Scenario
     from .simulation import Run
 
@@ -94,8 +95,7 @@ def summary_of(run: Run) -> dict[str, Any]:
             "text": str(run.outcome),
         },
         "network_changes": [
-            {"time": c.time, "added": [list(e) for e in c.added], "removed": [list(e) for e in c.removed]}
-            for c in run.network_changes
+            {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
         ],
         "costs": run.costs,
         "converged": run.converged,
@@ -103,6 +103,10 @@ def summary_of(run: Run) -> dict[str, Any]:
         "synthesis_iterations": run.iterations,
         **{key: value for key, value in provenance(run.scenario).items() if key != "scenario"},
     }
+
+
+def _arrows(edges: tuple[Edge, ...]) -> list[str]:
+    return [f"{observer}->{seen}" for observer, seen in edges]
 
 
 def save(run: Run, folder: str | os.PathLike[str]) -> None:

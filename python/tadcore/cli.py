@@ -119,8 +119,6 @@ def reproduce(
 
     _usable(out)
     report = all_runs(out, figures=figures)
-    say(str(report))
-    say(f"written to {out}")
     if not report.ok:
         complain("a computed number differs from the paper's where it must not")
         raise typer.Exit(_FAILED)
