@@ -17,7 +17,7 @@ import typer
 
 from . import scenarios as bundled
 from ._terminal import complain, say
-from .errors import MISSING, NoEquilibriumError, ScenarioError
+from .errors import MISSING, ScenarioError, TadcoreError
 
 if TYPE_CHECKING:
     from .scenario import Scenario
@@ -163,12 +163,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its answer
     try:
         app(args=None if arguments is None else list(arguments), prog_name="tadcore")
-    except NoEquilibriumError as error:
-        complain(str(error))
-        sys.exit(_FAILED)
     except ScenarioError as error:
         complain("\n".join([str(error), *getattr(error, "__notes__", ())]))
         sys.exit(_BAD_INPUT)
+    except TadcoreError as error:
+        complain(str(error))
+        sys.exit(_FAILED)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}{error.strerror or error}")

@@ -120,7 +120,7 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
     def longest_horizon(self) -> float:
         """The longest horizon on this grid for which an equilibrium exists; 0.0 where there is none."""
         whole = max(math.ceil(self.escape_time / self.step) - 1, 0)
-        # Multiples are formed in decimal, so that 3 steps of 0.1 read 0.3.
+        # Multiples are formed in decimal, so that 3 steps of 0.1 read 0.3; and so do 3 steps of 0.3 / 3.
         while whole > 0 and _multiple(self.step, whole) >= self.escape_time:
             whole -= 1
         return _multiple(self.step, whole)
@@ -146,7 +146,7 @@ def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> Sce
 
 
 def _multiple(step: float, count: int) -> float:
-    return float(Decimal(repr(step)) * count)
+    return float(Decimal(f"{step:.15g}") * count)
 
 
 _reader = reprlib.Repr()
