@@ -142,6 +142,16 @@ def test_controls_of_chosen_players(runs):
         plotting.controls(runs["paper-i2"], players=["d9"], ax=agg_figure()[1])
 
 
+def test_theta_of_a_game_seen_whole_is_zero_not_rounding(runs):
+    ax = plotting.theta(runs["paper-i1-full"], ax=agg_figure()[1])
+    assert ax.get_yscale() == "linear"
+    assert np.all(ax.lines[0].get_ydata() == 0)
+    assert "everyone sees everyone" in ax.texts[0].get_text()
+    limited = plotting.theta(runs["paper-i1"], ax=agg_figure()[1])
+    assert [t.get_text() for t in limited.texts] == [r"$\Theta=0$"]
+    assert np.nanmin(limited.lines[0].get_ydata()) > 1e-6
+
+
 def test_a_restless_network_is_thinned_and_says_so(restless):
     figure, ax = agg_figure()
     plotting.controls(restless, ax=ax)

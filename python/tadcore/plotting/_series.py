@@ -140,6 +140,10 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     times = np.asarray(run.dataset["time"].values, dtype=float)
     total = np.asarray(run.dataset["theta"].values, dtype=float)
     terms = np.asarray(run.dataset["theta_terms"].values, dtype=float)
+    # exactly zero where everyone sees everyone, whatever rounding leaves there
+    seen = np.asarray(run.dataset["adjacency"].values, dtype=bool)
+    everyone = seen.reshape(len(times), -1).all(axis=1)
+    total, terms = np.where(everyone, 0.0, total), np.where(np.expand_dims(everyone, 1), 0.0, terms)
     scale = float(max(total.max(), terms.max()))
     ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=_span(times))
     if scale <= 0:
