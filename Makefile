@@ -32,7 +32,7 @@ demo: $(STAMP)  ## reproduce the paper: every run of section 6, computed, compar
 test: test-rust test-python  ## run every test, Rust and Python
 
 test-rust:
-	cargo test --release --workspace --locked
+	cargo test --release --locked
 
 test-python: $(STAMP)
 	$(BIN)/python -m pytest

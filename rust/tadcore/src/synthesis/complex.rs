@@ -15,7 +15,7 @@ use super::objective::norm;
 use super::problem::Problem;
 
 /// Θ over complex gains.
-pub(super) struct ComplexGains<'a, const N: usize> {
+pub(super) struct ComplexGains<'a, const N: usize, const M: usize> {
     problem: &'a Problem,
     real: Vec<f64>,
     imaginary: Vec<f64>,
@@ -25,7 +25,7 @@ pub(super) struct ComplexGains<'a, const N: usize> {
     scales: (f64, f64),
 }
 
-impl<'a, const N: usize> ComplexGains<'a, N> {
+impl<'a, const N: usize, const M: usize> ComplexGains<'a, N, M> {
     /// `scales` are the real problem's gradient and value scales at the canonical start.
     pub(super) fn new(problem: &'a Problem, scales: (f64, f64)) -> Self {
         let (n, m, groups) = (problem.size, problem.rows, problem.coupling.len());
@@ -41,8 +41,8 @@ impl<'a, const N: usize> ComplexGains<'a, N> {
     }
 
     #[inline(always)]
-    fn n(&self) -> usize {
-        if N > 0 { N } else { self.problem.size }
+    fn dimensions(&self) -> (usize, usize) {
+        if N > 0 { (N, M) } else { (self.problem.size, self.problem.rows) }
     }
 }
 
@@ -68,15 +68,16 @@ fn add_product(row: &mut [f64], n: usize, factor: f64, x: &[f64], e: &[f64]) {
     }
 }
 
-impl<const N: usize> Objective for ComplexGains<'_, N> {
+impl<const N: usize, const M: usize> Objective for ComplexGains<'_, N, M> {
     fn width(&self) -> usize {
-        2 * self.problem.rows * self.n()
+        let (n, m) = self.dimensions();
+        2 * n * m
     }
 
     #[inline(always)]
     fn value(&mut self, g: &[f64]) -> f64 {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
+        let (n, m) = self.dimensions();
         let (ra, ib) = g.split_at(m * n);
         for (x, t) in self.real.iter_mut().zip(&p.target) {
             *x = -t;
@@ -118,7 +119,7 @@ impl<const N: usize> Objective for ComplexGains<'_, N> {
     #[inline(always)]
     fn gradient(&mut self, g: &[f64], out: &mut [f64]) {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
+        let (n, m) = self.dimensions();
         let (ra, ib) = g.split_at(m * n);
         let (out_a, out_b) = out.split_at_mut(m * n);
         for i in 0..m {
@@ -149,7 +150,7 @@ impl<const N: usize> Objective for ComplexGains<'_, N> {
     #[inline(always)]
     fn hessian(&mut self, g: &[f64], out: &mut [f64]) {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
+        let (n, m) = self.dimensions();
         let (half, width) = (m * n, 2 * m * n);
         let (ra, ib) = g.split_at(half);
         for i in 0..m {

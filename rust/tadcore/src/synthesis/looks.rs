@@ -64,7 +64,7 @@ pub(super) struct Best {
 
 /// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
 #[inline(always)]
-pub(super) fn search<const N: usize>(
+pub(super) fn search<const N: usize, const M: usize>(
     problem: &Problem,
     variables: &[Variable],
     g: &mut [f64],
@@ -72,7 +72,7 @@ pub(super) fn search<const N: usize>(
     s: &mut Scratch,
 ) -> Best {
     let start = g.to_vec();
-    let mut real = RealGains::<N>::new(problem, 1);
+    let mut real = RealGains::<N, M>::new(problem, 1);
     let reached = minimise(&mut real, g, variables, limits, &mut s.newton);
     let certified = certify(&mut real, g, variables, s);
     let mut best = Best { reached, look: Look::Canonical, certified, iterations: reached.iterations };
@@ -80,9 +80,9 @@ pub(super) fn search<const N: usize>(
         return best;
     }
     let scales = (real.gradient_scale(&start), real.value_scale());
-    let mut complex = ComplexGains::<N>::new(problem, scales);
+    let mut complex = ComplexGains::<N, M>::new(problem, scales);
     look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    let mut stacked = RealGains::<N>::new(problem, 2);
+    let mut stacked = RealGains::<N, M>::new(problem, 2);
     look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
     let (n, from) = (problem.size, g.to_vec());
     for i in 0..problem.rows {
@@ -103,11 +103,11 @@ pub(super) fn search<const N: usize>(
 
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
 #[inline(always)]
-fn look<const N: usize, O: Objective>(
+fn look<const N: usize, const M: usize, O: Objective>(
     doubled: &mut O,
     name: Look,
     problem: &Problem,
-    real: &mut RealGains<N>,
+    real: &mut RealGains<N, M>,
     variables: &[Variable],
     start: &[f64],
     g: &mut [f64],
@@ -144,9 +144,9 @@ fn look<const N: usize, O: Objective>(
 
 /// Newton from `s.trial`; keeps the point in `g` when it is lower.
 #[inline(always)]
-fn finish<const N: usize>(
+fn finish<const N: usize, const M: usize>(
     name: Look,
-    real: &mut RealGains<N>,
+    real: &mut RealGains<N, M>,
     variables: &[Variable],
     g: &mut [f64],
     best: &mut Best,
@@ -164,7 +164,7 @@ fn finish<const N: usize>(
 
 /// Whether the certificate proves the critical point `g` to be a global minimiser.
 #[inline(always)]
-pub(super) fn certify<const N: usize>(real: &mut RealGains<N>, g: &[f64], variables: &[Variable], s: &mut Scratch) -> bool {
+pub(super) fn certify<const N: usize, const M: usize>(real: &mut RealGains<N, M>, g: &[f64], variables: &[Variable], s: &mut Scratch) -> bool {
     let (d, width) = (variables.len(), real.width());
     real.value(g);
     s.form.resize(width * width, 0.0);

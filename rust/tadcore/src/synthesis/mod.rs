@@ -121,19 +121,31 @@ impl Synthesizer {
 
     /// The gains for `topology` at the instant of `problem`.
     pub fn solve(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Gains {
-        match problem.size {
-            2 => self.solve_sized::<2>(problem, topology, options),
-            3 => self.solve_sized::<3>(problem, topology, options),
-            4 => self.solve_sized::<4>(problem, topology, options),
-            5 => self.solve_sized::<5>(problem, topology, options),
-            6 => self.solve_sized::<6>(problem, topology, options),
-            7 => self.solve_sized::<7>(problem, topology, options),
-            8 => self.solve_sized::<8>(problem, topology, options),
-            _ => self.solve_sized::<0>(problem, topology, options),
+        match (problem.size, problem.rows) {
+            (2, 1) => self.solve_sized::<2, 1>(problem, topology, options),
+            (2, 2) => self.solve_sized::<2, 2>(problem, topology, options),
+            (3, 2) => self.solve_sized::<3, 2>(problem, topology, options),
+            (3, 3) => self.solve_sized::<3, 3>(problem, topology, options),
+            (4, 3) => self.solve_sized::<4, 3>(problem, topology, options),
+            (4, 4) => self.solve_sized::<4, 4>(problem, topology, options),
+            (5, 4) => self.solve_sized::<5, 4>(problem, topology, options),
+            (5, 5) => self.solve_sized::<5, 5>(problem, topology, options),
+            (6, 5) => self.solve_sized::<6, 5>(problem, topology, options),
+            (6, 6) => self.solve_sized::<6, 6>(problem, topology, options),
+            (7, 6) => self.solve_sized::<7, 6>(problem, topology, options),
+            (7, 7) => self.solve_sized::<7, 7>(problem, topology, options),
+            (8, 7) => self.solve_sized::<8, 7>(problem, topology, options),
+            (8, 8) => self.solve_sized::<8, 8>(problem, topology, options),
+            _ => self.solve_sized::<0, 0>(problem, topology, options),
         }
     }
 
-    fn solve_sized<const N: usize>(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Gains {
+    fn solve_sized<const N: usize, const M: usize>(
+        &mut self,
+        problem: &Problem,
+        topology: &Topology,
+        options: Options,
+    ) -> Gains {
         let mut rows = vec![0.0; problem.rows * problem.size];
         start::canonical(problem, topology, &mut rows);
         start::variables(topology, &mut self.variables);
@@ -145,12 +157,12 @@ impl Synthesizer {
         };
         let (reached, look, certified, iterations) = match options.method {
             Method::Newton => {
-                let best = looks::search::<N>(problem, &self.variables, &mut rows, limits, &mut self.scratch);
+                let best = looks::search::<N, M>(problem, &self.variables, &mut rows, limits, &mut self.scratch);
                 (best.reached, best.look, best.certified, best.iterations)
             }
             Method::Descent => {
                 start::paper_variables(topology, &mut self.variables);
-                let mut real = RealGains::<N>::new(problem, 1);
+                let mut real = RealGains::<N, M>::new(problem, 1);
                 let reached = descent::descend(&mut real, &mut rows, &self.variables, limits);
                 let certified = looks::certify(&mut real, &rows, &self.variables, &mut self.scratch);
                 (reached, Look::Canonical, certified, reached.iterations)
@@ -228,9 +240,9 @@ mod tests {
     fn derivatives_match_differences() {
         for interaction in [Interaction::I1, Interaction::I2] {
             let (problem, _, g) = sample(interaction);
-            check(&mut RealGains::<0>::new(&problem, 1), &g[..g.len() / 2]);
-            check(&mut RealGains::<0>::new(&problem, 2), &g);
-            check(&mut ComplexGains::<0>::new(&problem, (1.0, 1.0)), &g);
+            check(&mut RealGains::<0, 0>::new(&problem, 1), &g[..g.len() / 2]);
+            check(&mut RealGains::<0, 0>::new(&problem, 2), &g);
+            check(&mut ComplexGains::<0, 0>::new(&problem, (1.0, 1.0)), &g);
         }
     }
 
@@ -239,7 +251,7 @@ mod tests {
         for interaction in [Interaction::I1, Interaction::I2] {
             let (problem, p, g) = sample(interaction);
             let g = &g[..g.len() / 2];
-            let value = RealGains::<0>::new(&problem, 1).value(g);
+            let value = RealGains::<0, 0>::new(&problem, 1).value(g);
             let sum = problem.weigh(&problem.terms(&p, g));
             assert!((sum - value).abs() < 1e-12 * value);
         }
@@ -269,7 +281,7 @@ impl Synthesizer {
         start::variables(t, &mut self.variables);
         let mut g = vec![0.0; p.rows * p.size];
         start::advance(&mut g, &self.variables, x);
-        let mut o = RealGains::<0>::new(p, 1);
+        let mut o = RealGains::<0, 0>::new(p, 1);
         let r = newton::minimise(&mut o, &mut g, &self.variables, Limits { iterations: 1000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY }, &mut self.scratch.newton);
         Gains { rows: g, theta: r.value, gradient_norm: r.gradient_norm, iterations: r.iterations, status: r.status, certified: false, look: Look::Canonical }
     }

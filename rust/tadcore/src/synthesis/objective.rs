@@ -20,8 +20,9 @@
 use super::newton::Objective;
 use super::problem::Problem;
 
-/// Θ over real gains, or over a stack of them. `N` is the size, or 0 when it is known only at run time.
-pub(super) struct RealGains<'a, const N: usize> {
+/// Θ over real gains, or over a stack of them. `N` and `M` are the size and the constrained players, both 0 when they
+/// are known only at run time.
+pub(super) struct RealGains<'a, const N: usize, const M: usize> {
     problem: &'a Problem,
     copies: usize,
     /// X, N × N.
@@ -49,7 +50,7 @@ pub(super) fn norm(x: &[f64]) -> f64 {
     x.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
-impl<'a, const N: usize> RealGains<'a, N> {
+impl<'a, const N: usize, const M: usize> RealGains<'a, N, M> {
     pub(super) fn new(problem: &'a Problem, copies: usize) -> Self {
         let (n, m) = (problem.size, problem.rows);
         let scale = Scale {
@@ -73,13 +74,13 @@ impl<'a, const N: usize> RealGains<'a, N> {
     }
 
     #[inline(always)]
-    fn n(&self) -> usize {
-        if N > 0 { N } else { self.problem.size }
+    fn dimensions(&self) -> (usize, usize) {
+        if N > 0 { (N, M) } else { (self.problem.size, self.problem.rows) }
     }
 
     #[inline(always)]
     fn fill_quadratic(&mut self) {
-        let (n, m) = (self.n(), self.problem.rows);
+        let (n, m) = self.dimensions();
         let width = m * n;
         for i in 0..m {
             for j in 0..=i {
@@ -103,7 +104,7 @@ impl<'a, const N: usize> RealGains<'a, N> {
 
     /// Adds 4γ₁ δ_ij r_i X to the constant part: the form whose definiteness certifies the point last evaluated.
     pub(super) fn certificate_form(&self, out: &mut [f64]) {
-        let (n, m) = (self.n(), self.problem.rows);
+        let (n, m) = self.dimensions();
         let width = m * n;
         out[..width * width].copy_from_slice(&self.quadratic);
         for i in 0..m {
@@ -118,59 +119,68 @@ impl<'a, const N: usize> RealGains<'a, N> {
     }
 }
 
-impl<const N: usize> Objective for RealGains<'_, N> {
+impl<const N: usize, const M: usize> Objective for RealGains<'_, N, M> {
     fn width(&self) -> usize {
-        self.copies * self.problem.rows * self.n()
+        let (n, m) = self.dimensions();
+        self.copies * n * m
     }
 
     #[inline(always)]
     fn value(&mut self, g: &[f64]) -> f64 {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
-        for (x, t) in self.x.iter_mut().zip(&p.target) {
+        let (n, m) = self.dimensions();
+        let (r, closeness, fne) = (&p.r[..m], &p.closeness[..m], &p.fne[..m * n]);
+        let x = &mut self.x[..n * n];
+        for (x, t) in x.iter_mut().zip(&p.target[..n * n]) {
             *x = -t;
         }
         let mut rest = 0.0;
-        for (row, gi) in g.chunks_exact(n).enumerate() {
-            let i = row % m;
-            for a in 0..n {
-                let factor = p.r[i] * gi[a];
-                for (x, gb) in self.x[a * n..(a + 1) * n].iter_mut().zip(gi) {
-                    *x += factor * gb;
-                }
-            }
-            let delta = &mut self.delta[row * n..(row + 1) * n];
-            delta.copy_from_slice(gi);
-            if row < m {
-                for (d, f) in delta.iter_mut().zip(&p.fne[i * n..(i + 1) * n]) {
-                    *d -= f;
-                }
-            }
-            rest += p.closeness[i] * delta.iter().map(|d| d * d).sum::<f64>();
-        }
-        let quartic: f64 = self.x.iter().map(|x| x * x).sum();
-        let groups = p.coupling.len();
-        for (at, e) in self.coupled.chunks_exact_mut(n * n).enumerate() {
-            let w = &p.coupling[at % groups];
-            let delta = &self.delta[at / groups * m * n..];
-            e.fill(0.0);
+        for copy in 0..self.copies {
+            let g = &g[copy * m * n..][..m * n];
+            let delta = &mut self.delta[copy * m * n..][..m * n];
             for i in 0..m {
-                let di = &delta[i * n..(i + 1) * n];
+                let gi = &g[i * n..(i + 1) * n];
                 for a in 0..n {
-                    let factor = w[i * n + a];
-                    for (x, d) in e[a * n..(a + 1) * n].iter_mut().zip(di) {
-                        *x += factor * d;
+                    let factor = r[i] * gi[a];
+                    for (x, gb) in x[a * n..(a + 1) * n].iter_mut().zip(gi) {
+                        *x += factor * gb;
                     }
                 }
-            }
-            for a in 0..n {
-                for b in 0..=a {
-                    let sum = e[a * n + b] + e[b * n + a];
-                    e[a * n + b] = sum;
-                    e[b * n + a] = sum;
+                let di = &mut delta[i * n..(i + 1) * n];
+                let mut sum = 0.0;
+                for a in 0..n {
+                    di[a] = if copy == 0 { gi[a] - fne[i * n + a] } else { gi[a] };
+                    sum += di[a] * di[a];
                 }
+                rest += closeness[i] * sum;
             }
-            rest += e.iter().map(|x| x * x).sum::<f64>();
+        }
+        let quartic: f64 = x.iter().map(|x| x * x).sum();
+        let groups = p.coupling.len();
+        for copy in 0..self.copies {
+            let delta = &self.delta[copy * m * n..][..m * n];
+            for (group, w) in p.coupling.iter().enumerate() {
+                let w = &w[..m * n];
+                let e = &mut self.coupled[(copy * groups + group) * n * n..][..n * n];
+                e.fill(0.0);
+                for i in 0..m {
+                    let di = &delta[i * n..(i + 1) * n];
+                    for a in 0..n {
+                        let factor = w[i * n + a];
+                        for (x, d) in e[a * n..(a + 1) * n].iter_mut().zip(di) {
+                            *x += factor * d;
+                        }
+                    }
+                }
+                for a in 0..n {
+                    for b in 0..=a {
+                        let sum = e[a * n + b] + e[b * n + a];
+                        e[a * n + b] = sum;
+                        e[b * n + a] = sum;
+                    }
+                }
+                rest += e.iter().map(|x| x * x).sum::<f64>();
+            }
         }
         p.gamma[0] * quartic + rest
     }
@@ -178,25 +188,37 @@ impl<const N: usize> Objective for RealGains<'_, N> {
     #[inline(always)]
     fn gradient(&mut self, g: &[f64], out: &mut [f64]) {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
+        let (n, m) = self.dimensions();
+        let (r, closeness, x) = (&p.r[..m], &p.closeness[..m], &self.x[..n * n]);
         let groups = p.coupling.len();
-        for (row, y) in out.chunks_exact_mut(n).enumerate() {
-            let i = row % m;
-            let c = 2.0 * p.closeness[i];
-            for (y, d) in y.iter_mut().zip(&self.delta[row * n..(row + 1) * n]) {
-                *y = c * d;
-            }
-            let own = 4.0 * p.gamma[0] * p.r[i];
-            for a in 0..n {
-                let factor = own * g[row * n + a];
-                for (y, x) in y.iter_mut().zip(&self.x[a * n..(a + 1) * n]) {
-                    *y += factor * x;
+        for copy in 0..self.copies {
+            let g = &g[copy * m * n..][..m * n];
+            let out = &mut out[copy * m * n..][..m * n];
+            let delta = &self.delta[copy * m * n..][..m * n];
+            for i in 0..m {
+                let y = &mut out[i * n..(i + 1) * n];
+                let c = 2.0 * closeness[i];
+                for (y, d) in y.iter_mut().zip(&delta[i * n..(i + 1) * n]) {
+                    *y = c * d;
                 }
-                for (group, w) in p.coupling.iter().enumerate() {
-                    let factor = 4.0 * w[i * n + a];
-                    let at = (row / m * groups + group) * n * n + a * n;
-                    for (y, x) in y.iter_mut().zip(&self.coupled[at..at + n]) {
+                let own = 4.0 * p.gamma[0] * r[i];
+                for a in 0..n {
+                    let factor = own * g[i * n + a];
+                    for (y, x) in y.iter_mut().zip(&x[a * n..(a + 1) * n]) {
                         *y += factor * x;
+                    }
+                }
+            }
+            for (group, w) in p.coupling.iter().enumerate() {
+                let w = &w[..m * n];
+                let e = &self.coupled[(copy * groups + group) * n * n..][..n * n];
+                for i in 0..m {
+                    let y = &mut out[i * n..(i + 1) * n];
+                    for a in 0..n {
+                        let factor = 4.0 * w[i * n + a];
+                        for (y, x) in y.iter_mut().zip(&e[a * n..(a + 1) * n]) {
+                            *y += factor * x;
+                        }
                     }
                 }
             }
@@ -206,34 +228,47 @@ impl<const N: usize> Objective for RealGains<'_, N> {
     #[inline(always)]
     fn hessian(&mut self, g: &[f64], out: &mut [f64]) {
         let p = self.problem;
-        let (n, m) = (self.n(), p.rows);
-        let (width, single) = (self.copies * m * n, m * n);
-        for (row, gi) in g.chunks_exact(n).enumerate() {
-            let i = row % m;
-            for (column, gj) in g.chunks_exact(n).enumerate().take(row + 1) {
-                let j = column % m;
-                let factor = 4.0 * p.gamma[0] * p.r[i] * p.r[j];
-                let diagonal: f64 = factor * gi.iter().zip(gj).map(|(x, y)| x * y).sum::<f64>();
-                let own = 4.0 * p.gamma[0] * p.r[i];
-                for a in 0..n {
-                    let at = (row * n + a) * width + column * n;
-                    let h = &mut out[at..at + n];
-                    let scale = factor * gj[a];
-                    for (h, x) in h.iter_mut().zip(gi) {
-                        *h = scale * x;
+        let (n, m) = self.dimensions();
+        let single = m * n;
+        let (r, x, quadratic) = (&p.r[..m], &self.x[..n * n], &self.quadratic[..single * single]);
+        let width = self.copies * single;
+        for (upper, lower) in (0..self.copies).flat_map(|u| (0..=u).map(move |l| (u, l))) {
+            let (gu, gl) = (&g[upper * single..][..single], &g[lower * single..][..single]);
+            let same = upper == lower;
+            for i in 0..m {
+                let gi = &gu[i * n..(i + 1) * n];
+                let last = if same { i + 1 } else { m };
+                for j in 0..last {
+                    let gj = &gl[j * n..(j + 1) * n];
+                    let factor = 4.0 * p.gamma[0] * r[i] * r[j];
+                    let mut dot = 0.0;
+                    for a in 0..n {
+                        dot += gi[a] * gj[a];
                     }
-                    if row / m == column / m {
-                        let q = &self.quadratic[(i * n + a) * single + j * n..][..n];
-                        for (h, q) in h.iter_mut().zip(q) {
-                            *h += q;
+                    for a in 0..n {
+                        let h = &mut out[(upper * single + i * n + a) * width + lower * single + j * n..][..n];
+                        let scale = factor * gj[a];
+                        if same {
+                            let q = &quadratic[(i * n + a) * single + j * n..][..n];
+                            for b in 0..n {
+                                h[b] = q[b] + scale * gi[b];
+                            }
+                        } else {
+                            for b in 0..n {
+                                h[b] = scale * gi[b];
+                            }
+                        }
+                        h[a] += factor * dot;
+                    }
+                    if same && i == j {
+                        let own = 4.0 * p.gamma[0] * r[i];
+                        for a in 0..n {
+                            let h = &mut out[(upper * single + i * n + a) * width + lower * single + j * n..][..n];
+                            for (h, x) in h.iter_mut().zip(&x[a * n..(a + 1) * n]) {
+                                *h += own * x;
+                            }
                         }
                     }
-                    if row == column {
-                        for (h, x) in h.iter_mut().zip(&self.x[a * n..(a + 1) * n]) {
-                            *h += own * x;
-                        }
-                    }
-                    h[a] += diagonal;
                 }
             }
         }
