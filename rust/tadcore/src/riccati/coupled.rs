@@ -22,7 +22,8 @@
 //!
 //! Source: eq:Riccati of the paper, with the sign of time reversed.
 
-use super::dop853::{self, Flow, LANES};
+use super::dop853::{self, Flow};
+use super::lanes::{LANES, Width, widened};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
@@ -31,6 +32,7 @@ use crate::game::Game;
 const TOLERANCE: f64 = 1e-13;
 
 struct Coupled {
+    width: Width,
     n: usize,
     l: usize,
     block: usize,
@@ -52,6 +54,7 @@ impl Coupled {
         let n = game.size();
         let block = (rows * l).next_multiple_of(LANES);
         Self {
+            width: Width::detect(),
             n,
             l,
             block,
@@ -155,18 +158,27 @@ fn column_sums(n: usize, l: usize, p: &[f64], out: &mut [f64]) {
     }
 }
 
+widened! {
+    fn small<const N: usize, const L: usize>(flow: &mut Coupled, y: &[f64], dy: &mut [f64]) {
+        flow.evaluate::<L, 1>(N, L, y, dy);
+    }
+}
+
+widened! {
+    fn large(flow: &mut Coupled, y: &[f64], dy: &mut [f64]) {
+        flow.evaluate::<STRIP, TILE>(flow.n, flow.l, y, dy);
+    }
+}
+
 /// N known to the compiler, in rows of L entries.
 struct Small<const N: usize, const L: usize>(Coupled);
 
 impl<const N: usize, const L: usize> Flow for Small<N, L> {
-    fn blocks(&self) -> usize {
-        3
-    }
     fn block_len(&self) -> usize {
         self.0.block
     }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
-        self.0.evaluate::<L, 1>(N, L, y, dy);
+        small::<N, L>(self.0.width, &mut self.0, y, dy);
     }
 }
 
@@ -178,14 +190,11 @@ const TILE: usize = 2;
 struct Large(Coupled);
 
 impl Flow for Large {
-    fn blocks(&self) -> usize {
-        3
-    }
     fn block_len(&self) -> usize {
         self.0.block
     }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
-        self.0.evaluate::<STRIP, TILE>(self.0.n, self.0.l, y, dy);
+        large(self.0.width, &mut self.0, y, dy);
     }
 }
 

@@ -2,6 +2,7 @@
 mod coupled;
 mod dop853;
 mod escape;
+mod lanes;
 mod tableau;
 
 use crate::cancel::CancelToken;
