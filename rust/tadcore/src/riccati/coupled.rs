@@ -29,7 +29,7 @@ use crate::error::EquilibriumError;
 use crate::game::Game;
 
 /// Local error relative to each matrix's largest entry, per step.
-const TOLERANCE: f64 = 1e-13;
+fn tol() -> f64 { std::env::var("TOL").map_or(1e-13, |v| v.parse().unwrap()) }
 
 struct Coupled {
     width: Width,
@@ -37,9 +37,9 @@ struct Coupled {
     l: usize,
     block: usize,
     q: Vec<Vec<f64>>,
-    inv_rd: Vec<f64>,
-    inv_rtau: f64,
-    inv_ra: f64,
+    minus_inv_rd: Vec<f64>,
+    minus_inv_rtau: f64,
+    minus_inv_ra: f64,
     m: Vec<f64>,
     g: Vec<f64>,
     t: Vec<f64>,
@@ -48,20 +48,19 @@ struct Coupled {
 }
 
 impl Coupled {
-    /// `l` entries to a row, a multiple of the strip.
+    /// Rows of `l` entries, padded to `rows` of them.
     fn new(game: &Game, l: usize, rows: usize) -> Self {
         let w = game.weights();
         let n = game.size();
-        let block = (rows * l).next_multiple_of(LANES);
         Self {
             width: Width::detect(),
             n,
             l,
-            block,
+            block: (rows * l).next_multiple_of(LANES),
             q: game.state_weights(false),
-            inv_rd: w.r_d.iter().map(|r| 1.0 / r).collect(),
-            inv_rtau: 1.0 / w.r_tau,
-            inv_ra: 1.0 / w.r_a,
+            minus_inv_rd: w.r_d.iter().map(|r| -1.0 / r).collect(),
+            minus_inv_rtau: -1.0 / w.r_tau,
+            minus_inv_ra: -1.0 / w.r_a,
             m: vec![0.0; n * l],
             g: vec![0.0; rows * l],
             t: vec![0.0; l],
@@ -81,67 +80,71 @@ impl Coupled {
         y
     }
 
-    /// The right-hand side for N = `n` in rows of `l` = a multiple of W, R rows of G at a time.
+    /// The right-hand side for N = `n` in rows of `l` entries, a multiple of W and of B; the rows are padded to a
+    /// multiple of R and of B. Products in tiles of R × W, the addition of the transpose in tiles of B × B.
     #[inline(always)]
-    fn evaluate<const W: usize, const R: usize>(&mut self, n: usize, l: usize, y: &[f64], dy: &mut [f64]) {
-        let block = self.block;
-        let defenders = n - 1;
+    fn evaluate<const W: usize, const R: usize, const B: usize>(
+        &mut self,
+        n: usize,
+        l: usize,
+        y: &[f64],
+        dy: &mut [f64],
+    ) {
+        let (block, defenders, strips) = (self.block, n - 1, l / W);
         let (p_d, p_tau, p_a) = (&y[..block], &y[block..2 * block], &y[2 * block..3 * block]);
-        // t / r_τ and a / r_a
-        let t = &mut self.t[..l];
-        for (v, x) in t.iter_mut().zip(&p_tau[defenders * l..n * l]) {
-            *v = x * self.inv_rtau;
+        // −tᵀ / r_τ and −aᵀ / r_a
+        let t = self.t.as_chunks_mut::<W>().0;
+        for (t, p) in t.iter_mut().zip(&p_tau.as_chunks::<W>().0[defenders * strips..]) {
+            *t = p.map(|x| x * self.minus_inv_rtau);
         }
-        let a = &mut self.a[..l];
-        column_sums(n, l, p_a, a);
-        for v in a.iter_mut() {
-            *v *= self.inv_ra;
+        let a = self.a.as_chunks_mut::<W>().0;
+        column_sums::<W>(n, strips, p_a, a);
+        for a in a.iter_mut() {
+            *a = a.map(|x| x * self.minus_inv_ra);
         }
-        // S_d P_d, strip by strip
-        for strip in 0..l / W {
-            let m = &mut self.m[strip * defenders * W..(strip + 1) * defenders * W];
-            for (k, row) in m.as_chunks_mut::<W>().0.iter_mut().enumerate() {
-                for c in 0..W {
-                    row[c] = p_d[k * l + strip * W + c] * self.inv_rd[k];
-                }
+        // −S_d P_d, strip by strip
+        for (s, m) in self.m.as_chunks_mut::<W>().0.chunks_exact_mut(defenders).take(strips).enumerate() {
+            for ((m, p), r) in m.iter_mut().zip(p_d.as_chunks::<W>().0.chunks_exact(strips)).zip(&self.minus_inv_rd) {
+                *m = p[s].map(|x| x * r);
             }
         }
-        let v = &mut self.v[..l];
         for (p, matrix) in [p_d, p_tau, p_a].into_iter().enumerate() {
-            column_sums(n, l, matrix, v);
-            let u = &matrix[defenders * l..n * l];
-            let (half_d, half_tau, half_a) =
-                (if p == 0 { 0.5 } else { 1.0 }, if p == 1 { 0.5 } else { 1.0 }, if p == 2 { 0.5 } else { 1.0 });
-            for strip in 0..l / W {
-                let m = self.m[strip * defenders * W..(strip + 1) * defenders * W].as_chunks::<W>().0;
+            column_sums::<W>(n, strips, matrix, self.v.as_chunks_mut::<W>().0);
+            let half = |own: usize| if p == own { 0.5 } else { 1.0 };
+            let (half_d, half_tau, half_a) = (half(0), half(1), half(2));
+            let (u, v) = (&matrix[defenders * l..n * l], &self.v[..l]);
+            for (s, m) in self.m.as_chunks::<W>().0.chunks_exact(defenders).take(strips).enumerate() {
+                let (t, a) = (&t[s], &a[s]);
                 let mut i = 0;
                 while i < n {
-                    let rows: [&[f64]; R] = std::array::from_fn(|r| &matrix[(i + r) * l..(i + r) * l + defenders]);
+                    // A column of a symmetric matrix is its row, where the entries for R rows lie together.
                     let mut sum = [[0.0; W]; R];
-                    for (k, m) in m.iter().enumerate() {
-                        for r in 0..R {
-                            for c in 0..W {
-                                sum[r][c] += rows[r][k] * m[c];
+                    for (row, m) in matrix.chunks_exact(l).zip(m) {
+                        if let Some(left) = row[i..].first_chunk::<R>() {
+                            for r in 0..R {
+                                for c in 0..W {
+                                    sum[r][c] += left[r] * m[c];
+                                }
                             }
                         }
                     }
-                    for r in 0..R {
-                        let (u, v) = (half_tau * u[i + r], half_a * v[i + r]);
-                        for c in 0..W {
-                            let j = strip * W + c;
-                            self.g[(i + r) * l + j] = half_d * sum[r][c] + (u * t[j] + v * a[j]);
+                    let g = &mut self.g.as_chunks_mut::<W>().0[i * strips..];
+                    if let (Some(u), Some(v)) = (u[i..].first_chunk::<R>(), v[i..].first_chunk::<R>()) {
+                        for r in 0..R {
+                            let (u, v) = (half_tau * u[r], half_a * v[r]);
+                            let g = &mut g[r * strips + s];
+                            for c in 0..W {
+                                g[c] = half_d * sum[r][c] + (u * t[c] + v * a[c]);
+                            }
                         }
                     }
                     i += R;
                 }
             }
-            let g = &self.g[..];
             let out = &mut dy[p * block..(p + 1) * block];
-            for i in 0..n {
-                for j in 0..n {
-                    out[i * l + j] = -(g[i * l + j] + g[j * l + i]);
-                }
-                out[i * l + i] += self.q[p][i];
+            add_transpose::<B>(n.div_ceil(B), l / B, &self.g, out);
+            for (i, q) in self.q[p].iter().enumerate() {
+                out[i * l + i] += q;
             }
         }
     }
@@ -149,42 +152,66 @@ impl Coupled {
 
 /// P 1, as the sum of the rows of a symmetric P.
 #[inline(always)]
-fn column_sums(n: usize, l: usize, p: &[f64], out: &mut [f64]) {
-    out[..l].copy_from_slice(&p[..l]);
-    for i in 1..n {
-        for j in 0..l {
-            out[j] += p[i * l + j];
+fn column_sums<const W: usize>(n: usize, strips: usize, p: &[f64], out: &mut [[f64; W]]) {
+    out.fill([0.0; W]);
+    for row in p.as_chunks::<W>().0.chunks_exact(strips).take(n) {
+        for (o, x) in out.iter_mut().zip(row) {
+            for c in 0..W {
+                o[c] += x[c];
+            }
+        }
+    }
+}
+
+/// out = G + Gᵀ in tiles of B × B, each sum computed once.
+#[inline(always)]
+fn add_transpose<const B: usize>(tiles: usize, stride: usize, g: &[f64], out: &mut [f64]) {
+    let (g, out) = (g.as_chunks::<B>().0, out.as_chunks_mut::<B>().0);
+    for bi in 0..tiles {
+        for bj in 0..=bi {
+            let mut sum = [[0.0; B]; B];
+            for r in 0..B {
+                for c in 0..B {
+                    sum[r][c] = g[(bi * B + r) * stride + bj][c] + g[(bj * B + c) * stride + bi][r];
+                }
+            }
+            for r in 0..B {
+                out[(bi * B + r) * stride + bj] = sum[r];
+                out[(bj * B + r) * stride + bi] = std::array::from_fn(|c| sum[c][r]);
+            }
         }
     }
 }
 
 widened! {
-    fn small<const N: usize, const L: usize>(flow: &mut Coupled, y: &[f64], dy: &mut [f64]) {
-        flow.evaluate::<L, 1>(N, L, y, dy);
+    #[inline(never)]
+    fn small<const N: usize, const L: usize, const R: usize, const B: usize>(flow: &mut Coupled, y: &[f64], dy: &mut [f64]) {
+        flow.evaluate::<L, R, B>(N, L, y, dy);
     }
 }
 
 widened! {
+    #[inline(never)]
     fn large(flow: &mut Coupled, y: &[f64], dy: &mut [f64]) {
-        flow.evaluate::<STRIP, TILE>(flow.n, flow.l, y, dy);
+        flow.evaluate::<STRIP, TILE, 4>(flow.n, flow.l, y, dy);
     }
 }
 
-/// N known to the compiler, in rows of L entries.
-struct Small<const N: usize, const L: usize>(Coupled);
+/// N known to the compiler, in rows of L entries and tiles of R rows.
+struct Small<const N: usize, const L: usize, const R: usize, const B: usize>(Coupled);
 
-impl<const N: usize, const L: usize> Flow for Small<N, L> {
+impl<const N: usize, const L: usize, const R: usize, const B: usize> Flow for Small<N, L, R, B> {
     fn block_len(&self) -> usize {
         self.0.block
     }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
-        small::<N, L>(self.0.width, &mut self.0, y, dy);
+        small::<N, L, R, B>(self.0.width, &mut self.0, y, dy);
     }
 }
 
 /// Columns of a strip and rows of a tile for large N.
 const STRIP: usize = 8;
-const TILE: usize = 2;
+const TILE: usize = 4;
 
 /// Any N.
 struct Large(Coupled);
@@ -203,20 +230,20 @@ impl Flow for Large {
 pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
     let n = game.size();
     macro_rules! small {
-        ($n:literal, $l:literal) => {{
-            let core = Coupled::new(game, $l, $n);
+        ($n:literal, $l:literal, $r:literal, $b:literal) => {{
+            let core = Coupled::new(game, $l, usize::next_multiple_of($n, if $r > $b { $r } else { $b }));
             let (y0, block) = (core.terminal(game), core.block);
-            run(&mut Small::<$n, $l>(core), &y0, $l, block, game, cancel, nodes)
+            run(&mut Small::<$n, $l, $r, $b>(core), &y0, $l, block, game, cancel, nodes)
         }};
     }
     match n {
-        2 => small!(2, 2),
-        3 => small!(3, 4),
-        4 => small!(4, 4),
-        5 => small!(5, 6),
-        6 => small!(6, 6),
-        7 => small!(7, 8),
-        8 => small!(8, 8),
+        2 => small!(2, 2, 2, 2),
+        3 => small!(3, 4, 4, 4),
+        4 => small!(4, 4, 4, 4),
+        5 => small!(5, 8, 6, 2),
+        6 => small!(6, 8, 6, 2),
+        7 => small!(7, 8, 4, 4),
+        8 => small!(8, 8, 4, 4),
         _ => {
             let l = n.next_multiple_of(STRIP);
             let core = Coupled::new(game, l, n.next_multiple_of(TILE));
@@ -237,7 +264,7 @@ fn run(
 ) -> Result<usize, EquilibriumError> {
     let (n, grid) = (game.size(), game.grid());
     let steps = grid.steps();
-    dop853::integrate(flow, y0, grid.horizon(), steps, TOLERANCE, cancel, &mut |j, y| {
+    dop853::integrate(flow, y0, grid.horizon(), steps, tol(), cancel, &mut |j, y| {
         let node = &mut nodes[(steps - j) * 3 * n * n..][..3 * n * n];
         for (p, matrix) in node.chunks_exact_mut(n * n).enumerate() {
             for (i, row) in matrix.chunks_exact_mut(n).enumerate() {

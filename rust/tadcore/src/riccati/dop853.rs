@@ -2,7 +2,7 @@
 //!
 //! y is a stack of equally large blocks, one symmetric matrix per objective, padded with zeros to whole vector lanes.
 //! The step is accepted when, in every block by itself, the estimated error is below `tolerance` relative to the
-//! largest entry of that block, so a small matrix beside a large one keeps its digits. Values at the grid's nodes come
+//! Frobenius norm of that block, so a small matrix beside a large one keeps its digits. Values at the grid's nodes come
 //! from the dense output; steps are never cut to hit a node other than the last.
 //!
 //! | symbol | name here | meaning |
@@ -76,7 +76,7 @@ impl Workspace {
     }
 
     /// One trial step: the stages, the new point and its derivative. Returns the error estimate of the method relative
-    /// to each block's largest entry, the largest over the blocks, or NaN if the trial left the range of the numbers.
+    /// to each block's norm, the largest over the blocks, or NaN if the trial left the range of the numbers.
     fn attempt(&mut self, flow: &mut dyn Flow, h: f64) -> f64 {
         for i in 1..12 {
             self.evaluate(flow, i, h);
@@ -85,15 +85,13 @@ impl Workspace {
         flow.derivative(self.y_new.as_flattened(), self.dy.as_flattened_mut());
         lanes::store(self.width, 12, &self.dy, &mut self.k);
         let mut worst = 0.0_f64;
-        for ((y, y_new), k) in
-            self.y.chunks(self.block).zip(self.y_new.chunks(self.block)).zip(self.k.chunks(self.block))
-        {
-            let (five, three, size) = lanes::error_sums(self.width, y, y_new, k);
+        for (y_new, k) in self.y_new.chunks(self.block).zip(self.k.chunks(self.block)) {
+            let (five, three, size) = lanes::error_sums(self.width, y_new, k);
             if !(five.is_finite() && three.is_finite() && size.is_finite()) {
                 return f64::NAN;
             }
             if five > 0.0 && size > 0.0 {
-                worst = worst.max(h * five / ((five + 0.01 * three) * (self.block * LANES) as f64).sqrt() / size);
+                worst = worst.max(h * five / ((five + 0.01 * three) * size).sqrt());
             }
         }
         worst

@@ -123,21 +123,19 @@ widened! {
 }
 
 widened! {
-    /// Σ e5², Σ e3² and the largest |y| of one block.
+    /// Σ e5², Σ e3² and Σ y² at the new point, over one block.
     #[inline(never)]
-    pub(super) fn error_sums(y: &[Lane], y_new: &[Lane], k: &[[Lane; STAGES]]) -> (f64, f64, f64) {
-        let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0_f64; LANES]);
-        for ((y, y_new), k) in y.iter().zip(y_new).zip(k) {
+    pub(super) fn error_sums(y_new: &[Lane], k: &[[Lane; STAGES]]) -> (f64, f64, f64) {
+        let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for (y, k) in y_new.iter().zip(k) {
             let (e5, e3) = (sum(k, &t::E5), sum(k, &t::E3));
             for i in 0..LANES {
                 five[i] += e5[i] * e5[i];
                 three[i] += e3[i] * e3[i];
-                let (a, b) = (y[i].abs(), y_new[i].abs());
-                let larger = if a > b { a } else { b };
-                size[i] = if larger > size[i] { larger } else { size[i] };
+                size[i] += y[i] * y[i];
             }
         }
-        (five.iter().sum(), three.iter().sum(), size.iter().fold(0.0, |m, &v| if v > m { v } else { m }))
+        (five.iter().sum(), three.iter().sum(), size.iter().sum())
     }
 }
 
