@@ -90,71 +90,80 @@ impl Coupled {
         y: &[f64],
         dy: &mut [f64],
     ) {
+        let rows = n.next_multiple_of(R).next_multiple_of(B);
         let (block, defenders, strips) = (self.block, n - 1, l / W);
-        let (p_d, p_tau, p_a) = (&y[..block], &y[block..2 * block], &y[2 * block..3 * block]);
+        let m = self.m[..defenders * l].as_chunks_mut::<W>().0;
+        let g = self.g[..rows * l].as_chunks_mut::<W>().0;
+        let t = self.t[..l].as_chunks_mut::<W>().0;
+        let a = self.a[..l].as_chunks_mut::<W>().0;
+        let v = &mut self.v[..l];
+        let p: [&[f64]; 3] = std::array::from_fn(|p| &y[p * block..p * block + rows * l]);
         // −tᵀ / r_τ and −aᵀ / r_a
-        let t = self.t.as_chunks_mut::<W>().0;
-        for (t, p) in t.iter_mut().zip(&p_tau.as_chunks::<W>().0[defenders * strips..]) {
+        for (t, p) in t.iter_mut().zip(p[1][defenders * l..n * l].as_chunks::<W>().0) {
             *t = p.map(|x| x * self.minus_inv_rtau);
         }
-        let a = self.a.as_chunks_mut::<W>().0;
-        column_sums::<W>(n, strips, p_a, a);
+        row_sums::<W>(&p[2][..n * l], a);
         for a in a.iter_mut() {
             *a = a.map(|x| x * self.minus_inv_ra);
         }
         // −S_d P_d, strip by strip
-        for (s, m) in self.m.as_chunks_mut::<W>().0.chunks_exact_mut(defenders).take(strips).enumerate() {
-            for ((m, p), r) in m.iter_mut().zip(p_d.as_chunks::<W>().0.chunks_exact(strips)).zip(&self.minus_inv_rd) {
-                *m = p[s].map(|x| x * r);
+        for k in 0..defenders {
+            for s in 0..strips {
+                m[s * defenders + k] = p[0].as_chunks::<W>().0[k * strips + s].map(|x| x * self.minus_inv_rd[k]);
             }
         }
-        for (p, matrix) in [p_d, p_tau, p_a].into_iter().enumerate() {
-            column_sums::<W>(n, strips, matrix, self.v.as_chunks_mut::<W>().0);
-            let half = |own: usize| if p == own { 0.5 } else { 1.0 };
+        for (own, matrix) in p.into_iter().enumerate() {
+            row_sums::<W>(&matrix[..n * l], v.as_chunks_mut::<W>().0);
+            let half = |p: usize| if p == own { 0.5 } else { 1.0 };
             let (half_d, half_tau, half_a) = (half(0), half(1), half(2));
-            let (u, v) = (&matrix[defenders * l..n * l], &self.v[..l]);
-            for (s, m) in self.m.as_chunks::<W>().0.chunks_exact(defenders).take(strips).enumerate() {
+            let u = &matrix[defenders * l..n * l];
+            for s in 0..strips {
+                let m = &m[s * defenders..(s + 1) * defenders];
                 let (t, a) = (&t[s], &a[s]);
                 let mut i = 0;
                 while i < n {
-                    // A column of a symmetric matrix is its row, where the entries for R rows lie together.
-                    let mut sum = [[0.0; W]; R];
-                    for (row, m) in matrix.chunks_exact(l).zip(m) {
-                        if let Some(left) = row[i..].first_chunk::<R>() {
-                            for r in 0..R {
-                                for c in 0..W {
-                                    sum[r][c] += left[r] * m[c];
-                                }
-                            }
-                        }
-                    }
-                    let g = &mut self.g.as_chunks_mut::<W>().0[i * strips..];
-                    if let (Some(u), Some(v)) = (u[i..].first_chunk::<R>(), v[i..].first_chunk::<R>()) {
-                        for r in 0..R {
-                            let (u, v) = (half_tau * u[r], half_a * v[r]);
-                            let g = &mut g[r * strips + s];
-                            for c in 0..W {
-                                g[c] = half_d * sum[r][c] + (u * t[c] + v * a[c]);
-                            }
-                        }
+                    let sum = tile::<W, R>(&matrix[..defenders * l], l, i, m);
+                    for r in 0..R {
+                        let (u, v) = (half_tau * u[i + r], half_a * v[i + r]);
+                        g[(i + r) * strips + s] =
+                            std::array::from_fn(|c| half_d * sum[r][c] + (u * t[c] + v * a[c]));
                     }
                     i += R;
                 }
             }
-            let out = &mut dy[p * block..(p + 1) * block];
-            add_transpose::<B>(n.div_ceil(B), l / B, &self.g, out);
-            for (i, q) in self.q[p].iter().enumerate() {
+            let out = &mut dy[own * block..own * block + rows * l];
+            add_transpose::<B>(n.div_ceil(B), l / B, g.as_flattened(), out);
+            for (i, q) in self.q[own].iter().enumerate() {
                 out[i * l + i] += q;
             }
         }
     }
 }
 
+/// R rows, from row i, of a product of a symmetric matrix (its first rows) with a strip of W columns.
+#[inline(always)]
+fn tile<const W: usize, const R: usize>(p: &[f64], l: usize, i: usize, strip: &[[f64; W]]) -> [[f64; W]; R] {
+    let mut sum = [[0.0; W]; R];
+    for (row, m) in p.chunks_exact(l).zip(strip) {
+        // A column of a symmetric matrix is its row, where the entries for R rows lie together.
+        let left = &row[i..i + R];
+        for r in 0..R {
+            for c in 0..W {
+                sum[r][c] += left[r] * m[c];
+            }
+        }
+    }
+    sum
+}
+
 /// P 1, as the sum of the rows of a symmetric P.
 #[inline(always)]
-fn column_sums<const W: usize>(n: usize, strips: usize, p: &[f64], out: &mut [[f64; W]]) {
-    out.fill([0.0; W]);
-    for row in p.as_chunks::<W>().0.chunks_exact(strips).take(n) {
+fn row_sums<const W: usize>(p: &[f64], out: &mut [[f64; W]]) {
+    let mut rows = p.as_chunks::<W>().0.chunks_exact(out.len());
+    if let Some(first) = rows.next() {
+        out.copy_from_slice(first);
+    }
+    for row in rows {
         for (o, x) in out.iter_mut().zip(row) {
             for c in 0..W {
                 o[c] += x[c];
@@ -231,7 +240,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
     let n = game.size();
     macro_rules! small {
         ($n:literal, $l:literal, $r:literal, $b:literal) => {{
-            let core = Coupled::new(game, $l, usize::next_multiple_of($n, if $r > $b { $r } else { $b }));
+            let core = Coupled::new(game, $l, usize::next_multiple_of($n, $r).next_multiple_of($b));
             let (y0, block) = (core.terminal(game), core.block);
             run(&mut Small::<$n, $l, $r, $b>(core), &y0, $l, block, game, cancel, nodes)
         }};
@@ -246,7 +255,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         8 => small!(8, 8, 4, 4),
         _ => {
             let l = n.next_multiple_of(STRIP);
-            let core = Coupled::new(game, l, n.next_multiple_of(TILE));
+            let core = Coupled::new(game, l, n.next_multiple_of(TILE).next_multiple_of(4));
             let (y0, block) = (core.terminal(game), core.block);
             run(&mut Large(core), &y0, l, block, game, cancel, nodes)
         }

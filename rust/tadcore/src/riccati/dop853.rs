@@ -18,7 +18,7 @@
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4 to II.6.
 
 use super::escape;
-use super::lanes::{self, DENSE, LANES, Lane, STAGES, Width};
+use super::lanes::{self, DENSE, STAGES, Width};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 
@@ -33,7 +33,7 @@ const GROW: f64 = 6.0;
 
 /// An autonomous right-hand side on a stack of blocks, each padded with zeros to whole lanes.
 pub(super) trait Flow {
-    /// Entries of one block, padding included: a multiple of [`LANES`].
+    /// Entries of one block, padding included: a multiple of [`lanes::LANES`].
     fn block_len(&self) -> usize;
     /// dy/ds at `y`; the padding of `dy` is left at zero.
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]);
@@ -42,37 +42,38 @@ pub(super) trait Flow {
 /// The state and everything the integrator needs, allocated once.
 struct Workspace {
     width: Width,
-    /// Lanes of one block.
+    len: usize,
     block: usize,
-    y: Vec<Lane>,
-    y_new: Vec<Lane>,
-    stage: Vec<Lane>,
-    dy: Vec<Lane>,
-    k: Vec<[Lane; STAGES]>,
-    dense: Vec<[Lane; DENSE]>,
+    y: Vec<f64>,
+    y_new: Vec<f64>,
+    point: Vec<f64>,
+    k: Vec<f64>,
+    dense: Vec<f64>,
 }
 
 impl Workspace {
-    fn new(y0: &[f64], block_len: usize) -> Self {
-        let y = y0.as_chunks::<LANES>().0.to_vec();
-        let zeros = vec![[0.0; LANES]; y.len()];
+    fn new(y0: &[f64], block: usize) -> Self {
+        let len = y0.len();
         Self {
             width: Width::detect(),
-            block: block_len / LANES,
-            k: vec![[[0.0; LANES]; STAGES]; y.len()],
-            dense: vec![[[0.0; LANES]; DENSE]; y.len()],
-            y_new: zeros.clone(),
-            stage: zeros.clone(),
-            dy: zeros,
-            y,
+            len,
+            block,
+            y: y0.to_vec(),
+            y_new: vec![0.0; len],
+            point: vec![0.0; len],
+            k: vec![0.0; STAGES * len],
+            dense: vec![0.0; DENSE * len],
         }
+    }
+
+    fn stage(&self, i: usize) -> &[f64] {
+        &self.k[i * self.len..(i + 1) * self.len]
     }
 
     /// Evaluates stage `i` of a step of length h.
     fn evaluate(&mut self, flow: &mut dyn Flow, i: usize, h: f64) {
-        lanes::point(self.width, i, &mut self.stage, &self.y, &self.k, h);
-        flow.derivative(self.stage.as_flattened(), self.dy.as_flattened_mut());
-        lanes::store(self.width, i, &self.dy, &mut self.k);
+        lanes::point(self.width, i, &mut self.point, &self.y, &self.k, h);
+        flow.derivative(&self.point, &mut self.k[i * self.len..(i + 1) * self.len]);
     }
 
     /// One trial step: the stages, the new point and its derivative. Returns the error estimate of the method relative
@@ -82,11 +83,10 @@ impl Workspace {
             self.evaluate(flow, i, h);
         }
         lanes::point(self.width, 12, &mut self.y_new, &self.y, &self.k, h);
-        flow.derivative(self.y_new.as_flattened(), self.dy.as_flattened_mut());
-        lanes::store(self.width, 12, &self.dy, &mut self.k);
+        flow.derivative(&self.y_new, &mut self.k[12 * self.len..13 * self.len]);
         let mut worst = 0.0_f64;
-        for (y_new, k) in self.y_new.chunks(self.block).zip(self.k.chunks(self.block)) {
-            let (five, three, size) = lanes::error_sums(self.width, y_new, k);
+        for start in (0..self.len).step_by(self.block) {
+            let (five, three, size) = lanes::error_sums(self.width, &self.y_new, &self.k, start, self.block);
             if !(five.is_finite() && three.is_finite() && size.is_finite()) {
                 return f64::NAN;
             }
@@ -105,19 +105,19 @@ impl Workspace {
         lanes::dense(self.width, &mut self.dense, &self.y, &self.y_new, &self.k, h);
     }
 
-    /// A hundredth of the time in which some block would change by its own size; `dy` holds the derivative at `y`.
+    /// A hundredth of the time in which some block would change by its own size.
     fn first_step(&self, horizon: f64) -> f64 {
-        let largest = |v: &[Lane]| v.as_flattened().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let blocks = self.y.chunks(self.block).zip(self.dy.chunks(self.block));
+        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let blocks = self.y.chunks(self.block).zip(self.stage(0).chunks(self.block));
         blocks.map(|(y, dy)| (largest(y), largest(dy))).fold(horizon, |h, (size, rate)| {
             if size > 0.0 && rate > 0.0 { h.min(0.01 * size / rate) } else { h }
         })
     }
 
-    /// The largest relative growth of a block at the new point, where `dy` holds the derivative.
+    /// The largest relative growth of a block at the new point.
     fn growth(&self) -> f64 {
-        let blocks = self.y_new.chunks(self.block).zip(self.dy.chunks(self.block));
-        blocks.map(|(p, dp)| escape::growth(p.as_flattened(), dp.as_flattened())).fold(0.0, f64::max)
+        let blocks = self.y_new.chunks(self.block).zip(self.stage(12).chunks(self.block));
+        blocks.map(|(p, dp)| escape::growth(p, dp)).fold(0.0, f64::max)
     }
 }
 
@@ -135,8 +135,7 @@ pub(super) fn integrate(
     let mut w = Workspace::new(y0, flow.block_len());
     let node = |j: usize| j as f64 * horizon / steps as f64;
     sink(0, y0);
-    flow.derivative(w.y.as_flattened(), w.dy.as_flattened_mut());
-    lanes::store(w.width, 0, &w.dy, &mut w.k);
+    flow.derivative(y0, &mut w.k[..y0.len()]);
     let mut h = w.first_step(horizon);
     let (mut s, mut next, mut accepted, mut attempts, mut rejected) = (0.0_f64, 1, 0, 0, false);
     while next <= steps {
@@ -170,10 +169,10 @@ pub(super) fn integrate(
             }
             while next <= steps && node(next) <= reached {
                 if last && next == steps {
-                    sink(next, w.y_new.as_flattened());
+                    sink(next, &w.y_new);
                 } else {
-                    lanes::interpolate(w.width, &mut w.stage, &w.y, &w.dense, (node(next) - s) / h);
-                    sink(next, w.stage.as_flattened());
+                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, (node(next) - s) / h);
+                    sink(next, &w.point);
                 }
                 next += 1;
                 if next % 1024 == 0 {
@@ -182,9 +181,7 @@ pub(super) fn integrate(
             }
         }
         std::mem::swap(&mut w.y, &mut w.y_new);
-        for k in &mut w.k {
-            k[0] = k[12];
-        }
+        w.k.copy_within(12 * w.len..13 * w.len, 0);
         s = reached;
         h *= factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
         rejected = false;

@@ -1,12 +1,12 @@
 //! out = base + h Σ_j a_j k_j: the loops over the state, in whole vector lanes.
 //!
-//! The stages of eight entries lie together (chunk, stage, lane), so a sum walks memory once. Each loop is compiled
+//! Each loop is compiled
 //! twice, for the baseline of the target and for AVX2, and the processor decides at run time. Only the width differs:
 //! the operations and their order are the same and none is fused, so both give the same bits.
 //!
 //! | symbol | name here | meaning |
 //! |---|---|---|
-//! | k_j | `k[c][j]` | entries 8c…8c+7 of stage j |
+//! | k_j | `k[j * len..]` | stage j, as long as the state |
 //! | a_j | `row` | (stage, weight) pairs of the tableau |
 //!
 //! Source: the method of `dop853`; the layout is ours, by measurement.
@@ -19,9 +19,6 @@ pub(super) const LANES: usize = 8;
 pub(super) const STAGES: usize = 16;
 /// Coefficients of the dense output.
 pub(super) const DENSE: usize = 7;
-
-/// Eight entries.
-pub(super) type Lane = [f64; LANES];
 
 /// Which instructions the processor has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,31 +64,35 @@ macro_rules! widened {
 }
 pub(super) use widened;
 
+/// The stages that a row of the tableau uses, cut to the length of the state.
 #[inline(always)]
-fn sum<const M: usize, const S: usize>(k: &[Lane; S], row: &[(usize, f64); M]) -> Lane {
-    let mut sum = [0.0; LANES];
-    for &(j, a) in row {
-        for i in 0..LANES {
-            sum[i] += a * k[j][i];
-        }
+fn stages<'a, const M: usize>(k: &'a [f64], len: usize, row: &[(usize, f64); M]) -> [&'a [f64]; M] {
+    std::array::from_fn(|j| &k[row[j].0 * len..][..len])
+}
+
+/// Σ_j a_j k_j at entry i.
+#[inline(always)]
+fn sum<const M: usize>(k: &[&[f64]; M], row: &[(usize, f64); M], i: usize) -> f64 {
+    let mut sum = row[0].1 * k[0][i];
+    for j in 1..M {
+        sum += row[j].1 * k[j][i];
     }
     sum
 }
 
 #[inline(always)]
-fn step<const M: usize>(out: &mut [Lane], y: &[Lane], k: &[[Lane; STAGES]], row: &[(usize, f64); M], h: f64) {
-    for ((o, y), k) in out.iter_mut().zip(y).zip(k) {
-        let sum = sum(k, row);
-        for i in 0..LANES {
-            o[i] = y[i] + h * sum[i];
-        }
+fn step<const M: usize>(out: &mut [f64], y: &[f64], k: &[f64], row: &[(usize, f64); M], h: f64) {
+    let len = out.len();
+    let (y, k) = (&y[..len], stages(k, len, row));
+    for i in 0..len {
+        out[i] = y[i] + h * sum(&k, row, i);
     }
 }
 
 widened! {
     /// The point at which stage `i` (from zero) is evaluated; 12 is the new point.
     #[inline(never)]
-    pub(super) fn point(i: usize, out: &mut [Lane], y: &[Lane], k: &[[Lane; STAGES]], h: f64) {
+    pub(super) fn point(i: usize, out: &mut [f64], y: &[f64], k: &[f64], h: f64) {
         match i {
             1 => step(out, y, k, &t::A2, h),
             2 => step(out, y, k, &t::A3, h),
@@ -113,26 +114,22 @@ widened! {
 }
 
 widened! {
-    /// Stores a derivative as stage `i`.
+    /// Σ e5², Σ e3² and Σ y² at the new point over the entries from `start` of one block.
     #[inline(never)]
-    pub(super) fn store(i: usize, dy: &[Lane], k: &mut [[Lane; STAGES]]) {
-        for (k, dy) in k.iter_mut().zip(dy) {
-            k[i % STAGES] = *dy;
-        }
-    }
-}
-
-widened! {
-    /// Σ e5², Σ e3² and Σ y² at the new point, over one block.
-    #[inline(never)]
-    pub(super) fn error_sums(y_new: &[Lane], k: &[[Lane; STAGES]]) -> (f64, f64, f64) {
+    pub(super) fn error_sums(y_new: &[f64], k: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
+        let len = y_new.len();
+        let (k5, k3) = (stages(k, len, &t::E5), stages(k, len, &t::E3));
+        let k5 = k5.map(|k| &k[start..start + block]);
+        let k3 = k3.map(|k| &k[start..start + block]);
+        let y = &y_new[start..start + block];
         let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        for (y, k) in y_new.iter().zip(k) {
-            let (e5, e3) = (sum(k, &t::E5), sum(k, &t::E3));
+        for c in 0..block / LANES {
             for i in 0..LANES {
-                five[i] += e5[i] * e5[i];
-                three[i] += e3[i] * e3[i];
-                size[i] += y[i] * y[i];
+                let at = c * LANES + i;
+                let (e5, e3) = (sum(&k5, &t::E5, at), sum(&k3, &t::E3, at));
+                five[i] += e5 * e5;
+                three[i] += e3 * e3;
+                size[i] += y[at] * y[at];
             }
         }
         (five.iter().sum(), three.iter().sum(), size.iter().sum())
@@ -142,18 +139,35 @@ widened! {
 widened! {
     /// The dense output's coefficients for the step from `y` to `y_new`.
     #[inline(never)]
-    pub(super) fn dense(out: &mut [[Lane; DENSE]], y: &[Lane], y_new: &[Lane], k: &[[Lane; STAGES]], h: f64) {
-        for (((o, y), y_new), k) in out.iter_mut().zip(y).zip(y_new).zip(k) {
-            let high = [sum(k, &t::D4), sum(k, &t::D5), sum(k, &t::D6), sum(k, &t::D7)];
-            for i in 0..LANES {
-                let (dy, first, last) = (y_new[i] - y[i], h * k[0][i], h * k[12][i]);
-                o[0][i] = dy;
-                o[1][i] = first - dy;
-                o[2][i] = 2.0 * dy - (first + last);
-                for (o, high) in o[3..].iter_mut().zip(&high) {
-                    o[i] = h * high[i];
-                }
-            }
+    pub(super) fn dense(out: &mut [f64], y: &[f64], y_new: &[f64], k: &[f64], h: f64) {
+        let len = y.len();
+        let (low, high) = out.split_at_mut(3 * len);
+        let (k4, k5, k6, k7) =
+            (stages(k, len, &t::D4), stages(k, len, &t::D5), stages(k, len, &t::D6), stages(k, len, &t::D7));
+        let (first, last) = (&k[..len], &k[12 * len..13 * len]);
+        let (o0, rest) = low.split_at_mut(len);
+        let (o1, o2) = rest.split_at_mut(len);
+        let y_new = &y_new[..len];
+        for i in 0..len {
+            let dy = y_new[i] - y[i];
+            o0[i] = dy;
+            o1[i] = h * first[i] - dy;
+            o2[i] = 2.0 * dy - h * (first[i] + last[i]);
+        }
+        let (o4, rest) = high.split_at_mut(len);
+        let (o5, rest) = rest.split_at_mut(len);
+        let (o6, o7) = rest.split_at_mut(len);
+        for i in 0..len {
+            o4[i] = h * sum(&k4, &t::D4, i);
+        }
+        for i in 0..len {
+            o5[i] = h * sum(&k5, &t::D5, i);
+        }
+        for i in 0..len {
+            o6[i] = h * sum(&k6, &t::D6, i);
+        }
+        for i in 0..len {
+            o7[i] = h * sum(&k7, &t::D7, i);
         }
     }
 }
@@ -161,17 +175,12 @@ widened! {
 widened! {
     /// The dense output at θ in (0, 1].
     #[inline(never)]
-    pub(super) fn interpolate(out: &mut [Lane], y: &[Lane], dense: &[[Lane; DENSE]], theta: f64) {
+    pub(super) fn interpolate(out: &mut [f64], y: &[f64], dense: &[f64], theta: f64) {
         let mut weight = 1.0;
         let row: [(usize, f64); DENSE] = std::array::from_fn(|j| {
             weight *= if j % 2 == 0 { theta } else { 1.0 - theta };
             (j, weight)
         });
-        for ((o, y), d) in out.iter_mut().zip(y).zip(dense) {
-            let sum = sum(d, &row);
-            for i in 0..LANES {
-                o[i] = y[i] + sum[i];
-            }
-        }
+        step(out, y, dense, &row, 1.0);
     }
 }
