@@ -27,6 +27,8 @@ use crate::error::EquilibriumError;
 const STEP_BUDGET: usize = 2_000_000;
 /// Attempts between two polls of the cancel token.
 const POLL: usize = 64;
+/// Distance to a pole, relative to s, at which it is reported.
+const RESOLVED: f64 = 1e-15;
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
@@ -137,16 +139,19 @@ pub(super) fn integrate(
     sink(0, y0);
     flow.derivative(y0, &mut w.k[..y0.len()]);
     let mut h = w.first_step(horizon);
-    let (mut s, mut next, mut accepted, mut attempts, mut rejected) = (0.0_f64, 1, 0, 0, false);
+    // s = `s` + `low`: near a pole the steps fall below the last digit of s.
+    let (mut s, mut low) = (0.0_f64, 0.0_f64);
+    let (mut next, mut accepted, mut attempts, mut rejected) = (1, 0, 0, false);
     while next <= steps {
         if attempts % POLL == 0 {
             cancel.check()?;
         }
-        let last = s + 1.01 * h >= horizon;
+        let left = (horizon - s) - low;
+        let last = 1.01 * h >= left;
         if last {
-            h = horizon - s;
+            h = left;
         }
-        if attempts >= STEP_BUDGET || s + 0.01 * h <= s {
+        if attempts >= STEP_BUDGET || h <= 1e-20 * s {
             return Err(EquilibriumError::StepBudget { steps: attempts, reached: s, horizon });
         }
         attempts += 1;
@@ -159,9 +164,9 @@ pub(super) fn integrate(
             continue;
         }
         accepted += 1;
-        let reached = if last { horizon } else { s + h };
+        let (reached, reached_low) = if last { (horizon, 0.0) } else { two_sum(s, low + h) };
         if last || h < escape::GATE * reached {
-            escape::check(reached, w.growth(), horizon)?;
+            escape::check(reached, w.growth(), horizon, RESOLVED)?;
         }
         if node(next) <= reached {
             if !(last && next == steps) {
@@ -171,7 +176,7 @@ pub(super) fn integrate(
                 if last && next == steps {
                     sink(next, &w.y_new);
                 } else {
-                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, (node(next) - s) / h);
+                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, ((node(next) - s) - low) / h);
                     sink(next, &w.point);
                 }
                 next += 1;
@@ -182,9 +187,15 @@ pub(super) fn integrate(
         }
         std::mem::swap(&mut w.y, &mut w.y_new);
         w.k.copy_within(12 * w.len..13 * w.len, 0);
-        s = reached;
+        (s, low) = (reached, reached_low);
         h *= factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
         rejected = false;
     }
     Ok(accepted)
+}
+
+/// a + b = sum + rest exactly, for |a| ≥ |b|.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    (sum, b - (sum - a))
 }

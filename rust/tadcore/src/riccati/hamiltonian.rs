@@ -30,8 +30,10 @@ use crate::game::Game;
 
 /// Largest bound on ‖X − I‖ for which a step is taken.
 const BOUND: f64 = 0.5;
-/// Shortest step, δ 2⁻⁶⁰.
-const LEVELS: usize = 61;
+/// The shortest step is δ 2⁻¹²⁷.
+const LEVELS: usize = 128;
+/// Distance to a pole, relative to s, at which it is reported.
+const RESOLVED: f64 = 1e-13;
 /// Steps beyond one per grid interval after which the solver gives up.
 const STEP_BUDGET: usize = 20_000_000;
 /// Steps between two polls of the cancel token.
@@ -291,11 +293,11 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
                 j += 1;
                 let s = grid.time(k - 1) + done * flow.step;
                 if j >= LEVELS || taken > steps + STEP_BUDGET || !norm.is_finite() {
-                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon)?;
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
                     return Err(EquilibriumError::StepBudget { steps: taken, reached: s, horizon });
                 }
                 if flow.step * (-(j as f64)).exp2() < escape::GATE * s {
-                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon)?;
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
                 }
             }
             if let Some(level) = &flow.levels[j] {
@@ -315,7 +317,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         }
         write(&flow, &p, &mut nodes[(steps - k) * n * n..]);
     }
-    escape::check(horizon, escape::growth(&p, &flow.derivative(&p)), horizon)?;
+    escape::check(horizon, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
     Ok(taken)
 }
 
