@@ -1,0 +1,201 @@
+//! dy/ds = f(y): an adaptive integrator of order 8 with dense output of order 7.
+//!
+//! y is a stack of equally large blocks, one symmetric matrix per objective, padded with zeros to whole vector lanes.
+//! The step is accepted when, in every block by itself, the estimated error is below `tolerance` relative to the
+//! Frobenius norm of that block, so a small matrix beside a large one keeps its digits. Values at the grid's nodes come
+//! from the dense output; steps are never cut to hit a node other than the last.
+//!
+//! | symbol | name here | meaning |
+//! |---|---|---|
+//! | s | `s` | time before the horizon, T − t |
+//! | h | `h` | step in s |
+//! | k_i | `k[i]` | stage derivatives, 13 of the method and 3 for the dense output |
+//! | θ | `theta` | where a node lies in a step, in (0, 1] |
+//!
+//! The step is chosen by the plain controller h ← 0.9 h err^(−1/8), whose eighth root is three square roots: with no
+//! fused or reordered operation anywhere, the same game gives the same bits on every machine.
+//!
+//! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4 to II.6.
+
+use super::escape;
+use super::lanes::{self, DENSE, STAGES, Width};
+use crate::cancel::CancelToken;
+use crate::error::EquilibriumError;
+
+/// Attempted steps after which the integrator gives up. A game that needs more is stiff (a rate some 10⁶ times the
+/// inverse of the horizon), not escaping.
+const STEP_BUDGET: usize = 2_000_000;
+/// Attempts between two polls of the cancel token.
+const POLL: usize = 64;
+/// Distance to a pole, relative to s, at which it is reported.
+const RESOLVED: f64 = 1e-15;
+const SAFETY: f64 = 0.9;
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 6.0;
+
+/// An autonomous right-hand side on a stack of blocks, each padded with zeros to whole lanes.
+pub(super) trait Flow {
+    /// Entries of one block, padding included: a multiple of [`lanes::LANES`].
+    fn block_len(&self) -> usize;
+    /// dy/ds at `y`; the padding of `dy` is left at zero.
+    fn derivative(&mut self, y: &[f64], dy: &mut [f64]);
+}
+
+/// The state and everything the integrator needs, allocated once.
+struct Workspace {
+    width: Width,
+    len: usize,
+    block: usize,
+    y: Vec<f64>,
+    y_new: Vec<f64>,
+    point: Vec<f64>,
+    k: Vec<f64>,
+    dense: Vec<f64>,
+}
+
+impl Workspace {
+    fn new(y0: &[f64], block: usize) -> Self {
+        let len = y0.len();
+        Self {
+            width: Width::detect(),
+            len,
+            block,
+            y: y0.to_vec(),
+            y_new: vec![0.0; len],
+            point: vec![0.0; len],
+            k: vec![0.0; STAGES * len],
+            dense: vec![0.0; DENSE * len],
+        }
+    }
+
+    fn stage(&self, i: usize) -> &[f64] {
+        &self.k[i * self.len..(i + 1) * self.len]
+    }
+
+    /// Evaluates stage `i` of a step of length h.
+    fn evaluate(&mut self, flow: &mut dyn Flow, i: usize, h: f64) {
+        lanes::point(self.width, i, &mut self.point, &self.y, &self.k, h);
+        flow.derivative(&self.point, &mut self.k[i * self.len..(i + 1) * self.len]);
+    }
+
+    /// One trial step: the stages, the new point and its derivative. Returns the error estimate of the method relative
+    /// to each block's norm, the largest over the blocks, or NaN if the trial left the range of the numbers.
+    fn attempt(&mut self, flow: &mut dyn Flow, h: f64) -> f64 {
+        for i in 1..12 {
+            self.evaluate(flow, i, h);
+        }
+        lanes::point(self.width, 12, &mut self.y_new, &self.y, &self.k, h);
+        flow.derivative(&self.y_new, &mut self.k[12 * self.len..13 * self.len]);
+        let mut worst = 0.0_f64;
+        for start in (0..self.len).step_by(self.block) {
+            let (five, three, size) = lanes::error_sums(self.width, &self.y_new, &self.k, start, self.block);
+            if !(five.is_finite() && three.is_finite() && size.is_finite()) {
+                return f64::NAN;
+            }
+            if five > 0.0 && size > 0.0 {
+                worst = worst.max(h * five / ((five + 0.01 * three) * size).sqrt());
+            }
+        }
+        worst
+    }
+
+    /// Prepares the dense output of the step just taken.
+    fn prepare_dense(&mut self, flow: &mut dyn Flow, h: f64) {
+        for i in 13..STAGES {
+            self.evaluate(flow, i, h);
+        }
+        lanes::dense(self.width, &mut self.dense, &self.y, &self.y_new, &self.k, h);
+    }
+
+    /// A hundredth of the time in which some block would change by its own size.
+    fn first_step(&self, horizon: f64) -> f64 {
+        let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let blocks = self.y.chunks(self.block).zip(self.stage(0).chunks(self.block));
+        blocks.map(|(y, dy)| (largest(y), largest(dy))).fold(horizon, |h, (size, rate)| {
+            if size > 0.0 && rate > 0.0 { h.min(0.01 * size / rate) } else { h }
+        })
+    }
+
+    /// The largest relative growth of a block at the new point.
+    fn growth(&self) -> f64 {
+        let blocks = self.y_new.chunks(self.block).zip(self.stage(12).chunks(self.block));
+        blocks.map(|(p, dp)| escape::growth(p, dp)).fold(0.0, f64::max)
+    }
+}
+
+/// Runs a flow from `y0` at s = 0 to s = `horizon` and hands `sink(j, y)` the state at s = j · horizon / steps for every
+/// j = 0…steps. Returns the number of accepted steps.
+pub(super) fn integrate(
+    flow: &mut dyn Flow,
+    y0: &[f64],
+    horizon: f64,
+    steps: usize,
+    tolerance: f64,
+    cancel: &CancelToken,
+    sink: &mut dyn FnMut(usize, &[f64]),
+) -> Result<usize, EquilibriumError> {
+    let mut w = Workspace::new(y0, flow.block_len());
+    let node = |j: usize| j as f64 * horizon / steps as f64;
+    sink(0, y0);
+    flow.derivative(y0, &mut w.k[..y0.len()]);
+    let mut h = w.first_step(horizon);
+    // s = `s` + `low`: near a pole the steps fall below the last digit of s.
+    let (mut s, mut low) = (0.0_f64, 0.0_f64);
+    let (mut next, mut accepted, mut attempts, mut rejected) = (1, 0, 0, false);
+    while next <= steps {
+        if attempts % POLL == 0 {
+            cancel.check()?;
+        }
+        let left = (horizon - s) - low;
+        let last = 1.01 * h >= left;
+        if last {
+            h = left;
+        }
+        if attempts >= STEP_BUDGET || h <= 1e-20 * s {
+            return Err(EquilibriumError::StepBudget { steps: attempts, reached: s, horizon });
+        }
+        attempts += 1;
+        let err = w.attempt(flow, h) / tolerance;
+        let factor = SAFETY / err.sqrt().sqrt().sqrt();
+        if !(err <= 1.0) {
+            // Also where the trial overflowed and err is not a number.
+            h *= if factor.is_nan() { SHRINK } else { factor.clamp(SHRINK, SAFETY) };
+            rejected = true;
+            continue;
+        }
+        accepted += 1;
+        let (reached, reached_low) = if last { (horizon, 0.0) } else { two_sum(s, low + h) };
+        if last || h < escape::GATE * reached {
+            escape::check(reached, w.growth(), horizon, RESOLVED)?;
+        }
+        if node(next) <= reached {
+            if !(last && next == steps) {
+                w.prepare_dense(flow, h);
+            }
+            while next <= steps && node(next) <= reached {
+                if last && next == steps {
+                    sink(next, &w.y_new);
+                } else {
+                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, ((node(next) - s) - low) / h);
+                    sink(next, &w.point);
+                }
+                next += 1;
+                if next % 1024 == 0 {
+                    cancel.check()?;
+                }
+            }
+        }
+        std::mem::swap(&mut w.y, &mut w.y_new);
+        w.k.copy_within(12 * w.len..13 * w.len, 0);
+        (s, low) = (reached, reached_low);
+        h *= factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
+        rejected = false;
+    }
+    Ok(accepted)
+}
+
+/// a + b = sum + rest exactly, for |a| ≥ |b|.
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    (sum, b - (sum - a))
+}

@@ -1,0 +1,343 @@
+//! Interaction I2: dP/ds = Q − P S P, from P = F at s = T − t = 0, by exact steps of the Hamiltonian flow.
+//!
+//! P = Y X⁻¹ with X' = S Y, Y' = Q X. Restarted from (I, P) at every step of length h,
+//!
+//! X = I + Z, Z = C + E P, C = cosh(√(SQ) h) − I, E = h sinhc(√(SQ) h) S,
+//! P⁺ − P = (Q h sinhc(√(SQ) h) + Cᵀ P − P Z) X⁻¹,
+//!
+//! where the two functions are power series in SQ: no square root is taken. The increment is symmetrised, so P is
+//! symmetric to the bit and a million small steps do not add up a million rounding errors of the size of P.
+//!
+//! **No pole is jumped over.** P exists on (0, h] exactly if X(s) is regular for every s ≤ h, and
+//! ‖X(s) − I‖ ≤ (cosh ωs − 1) + ‖SP‖ sinh(ωs)/ω with ω² = ‖SQ‖. A step is taken only if this bound is at most ½;
+//! otherwise it is halved (lengths δ 2⁻ʲ, the exponential of each computed once). As ‖Z‖₁ ≤ ½, X is dominated by its
+//! diagonal, and elimination without pivoting is stable.
+//!
+//! | symbol | name here | meaning |
+//! |---|---|---|
+//! | S = S_a − S_dτ | `s` | 1 1ᵀ / r_a − diag(1/r_d, 1/r_τ), balanced |
+//! | Q | `q` | diagonal, balanced |
+//! | C, E, h sinhc(·) Q | [`Level`] | one exponential of the Hamiltonian matrix |
+//! | D | `balance` | powers of two near (1/r_a + 1/r_i)^½; the code solves for D P D, whose S is of order one |
+//!
+//! Source: eq:RDE of the paper, with the sign of time reversed; the bound is ours.
+
+use super::escape;
+use super::lanes::{Width, widened};
+use crate::cancel::CancelToken;
+use crate::error::EquilibriumError;
+use crate::game::Game;
+
+/// Largest bound on ‖X − I‖ for which a step is taken.
+const BOUND: f64 = 0.5;
+/// The shortest step is δ 2⁻¹²⁷.
+const LEVELS: usize = 128;
+/// Distance to a pole, relative to s, at which it is reported.
+const RESOLVED: f64 = 1e-13;
+/// Steps beyond one per grid interval after which the solver gives up.
+const STEP_BUDGET: usize = 20_000_000;
+/// Steps between two polls of the cancel token.
+const POLL: usize = 256;
+
+/// What a step of one length needs; matrices in rows, N × N.
+struct Level {
+    /// cosh ωh − 1 and sinh(ωh)/ω.
+    bound: (f64, f64),
+    /// C = cosh(√(SQ) h) − I.
+    c: Vec<f64>,
+    /// h sinhc(√(SQ) h) S, symmetric.
+    e: Vec<f64>,
+    /// Q h sinhc(√(SQ) h), symmetric.
+    f: Vec<f64>,
+}
+
+struct Flow {
+    n: usize,
+    /// Diagonal of −S_dτ and the scaled vector of S_a = w wᵀ.
+    s_diagonal: Vec<f64>,
+    w: Vec<f64>,
+    q: Vec<f64>,
+    balance: Vec<f64>,
+    omega: f64,
+    levels: Vec<Option<Level>>,
+    step: f64,
+}
+
+impl Flow {
+    fn new(game: &Game) -> Self {
+        let weights = game.weights();
+        let n = game.size();
+        let inverse: Vec<f64> = weights.r_d.iter().chain([&weights.r_tau]).map(|r| 1.0 / r).collect();
+        let balance: Vec<f64> =
+            inverse.iter().map(|r| (0.5 * (r + 1.0 / weights.r_a).log2()).round().exp2()).collect();
+        let s_diagonal: Vec<f64> = inverse.iter().zip(&balance).map(|(r, d)| -(r / d) / d).collect();
+        let w: Vec<f64> = balance.iter().map(|d| (1.0 / weights.r_a).sqrt() / d).collect();
+        let q: Vec<f64> = game.state_weights(false)[0].iter().zip(&balance).map(|(q, d)| q * d * d).collect();
+        let mut flow = Self {
+            n,
+            s_diagonal,
+            w,
+            q,
+            balance,
+            omega: 0.0,
+            levels: (0..LEVELS).map(|_| None).collect(),
+            step: game.grid().step(),
+        };
+        // ‖SQ‖₁: the largest column sum
+        let s = flow.s();
+        let column = |j: usize| (0..n).map(|i| s[i * n + j].abs()).sum::<f64>() * flow.q[j].abs();
+        flow.omega = (0..n).map(column).fold(0.0, f64::max).sqrt();
+        flow
+    }
+
+    fn s(&self) -> Vec<f64> {
+        let n = self.n;
+        let mut s: Vec<f64> = (0..n * n).map(|ij| self.w[ij / n] * self.w[ij % n]).collect();
+        for i in 0..n {
+            s[i * n + i] += self.s_diagonal[i];
+        }
+        s
+    }
+
+    /// The exponential of the Hamiltonian matrix over δ 2⁻ʲ, if the bound allows that length for any P at all.
+    fn make_level(&self, j: usize) -> Level {
+        let n = self.n;
+        let h = self.step * (-(j as f64)).exp2();
+        let x = self.omega * h;
+        let bound = (2.0 * (0.5 * x).sinh().powi(2), if x > 0.0 { x.sinh() / self.omega } else { h });
+        let mut level = Level { bound, c: vec![0.0; n * n], e: vec![0.0; n * n], f: vec![0.0; n * n] };
+        if bound.0 > BOUND {
+            return level;
+        }
+        // Power series in h² SQ, whose norm is below one here.
+        let s = self.s();
+        let mut power = vec![0.0; n * n];
+        let mut sinhc = vec![0.0; n * n];
+        for i in 0..n {
+            power[i * n + i] = 1.0;
+            sinhc[i * n + i] = 1.0;
+        }
+        for k in 1..=10 {
+            // power ← h² (power S) Q / ((2k − 1) 2k)
+            let product = multiply(n, &power, &s);
+            let factor = h * h / f64::from((2 * k - 1) * 2 * k);
+            for (ij, p) in power.iter_mut().enumerate() {
+                *p = product[ij] * self.q[ij % n] * factor;
+            }
+            for ij in 0..n * n {
+                level.c[ij] += power[ij];
+                sinhc[ij] += power[ij] / f64::from(2 * k + 1);
+            }
+        }
+        level.e = multiply(n, &sinhc, &s).iter().map(|v| v * h).collect();
+        level.f = (0..n * n).map(|ij| self.q[ij / n] * sinhc[ij] * h).collect();
+        symmetrise(n, &mut level.e);
+        symmetrise(n, &mut level.f);
+        level
+    }
+
+    /// ‖SP‖₁ for the balanced P.
+    fn norm_sp(&self, p: &[f64]) -> f64 {
+        let n = self.n;
+        let mut worst = 0.0_f64;
+        // Columns of SP are rows of PS, as both are symmetric.
+        for row in p.chunks_exact(n) {
+            let dot: f64 = row.iter().zip(&self.w).map(|(p, w)| p * w).sum();
+            let sum: f64 = (0..n).map(|i| (self.w[i] * dot + self.s_diagonal[i] * row[i]).abs()).sum();
+            worst = worst.max(sum);
+        }
+        worst
+    }
+
+    /// dP/ds = Q − P S P.
+    fn derivative(&self, p: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let v: Vec<f64> = p.chunks_exact(n).map(|row| row.iter().zip(&self.w).map(|(p, w)| p * w).sum()).collect();
+        let mut out = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..n {
+                let sum: f64 = (0..n).map(|k| p[i * n + k] * self.s_diagonal[k] * p[k * n + j]).sum();
+                out[i * n + j] = -(sum + v[i] * v[j]);
+            }
+            out[i * n + i] += self.q[i];
+        }
+        out
+    }
+}
+
+fn multiply(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; n * n];
+    for i in 0..n {
+        for k in 0..n {
+            for j in 0..n {
+                out[i * n + j] += a[i * n + k] * b[k * n + j];
+            }
+        }
+    }
+    out
+}
+
+fn symmetrise(n: usize, a: &mut [f64]) {
+    for i in 0..n {
+        for j in 0..i {
+            let mean = 0.5 * (a[i * n + j] + a[j * n + i]);
+            a[i * n + j] = mean;
+            a[j * n + i] = mean;
+        }
+    }
+}
+
+/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch.
+#[inline(always)]
+fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+    let (c, e, f) = (&level.c[..n * n], &level.e[..n * n], &level.f[..n * n]);
+    let (p, z, g) = (&mut p[..n * n], &mut z[..n * n], &mut g[..n * n]);
+    // Zᵀ = Cᵀ + P E in `z`; then Gᵀ = F + P C − Zᵀ P in `g`, so that the increment solves Xᵀ (ΔP)ᵀ = Gᵀ.
+    for i in 0..n {
+        for j in 0..n {
+            z[i * n + j] = c[j * n + i];
+            g[i * n + j] = f[i * n + j];
+        }
+        for k in 0..n {
+            let left = p[i * n + k];
+            for j in 0..n {
+                z[i * n + j] += left * e[k * n + j];
+                g[i * n + j] += left * c[k * n + j];
+            }
+        }
+        for k in 0..n {
+            let left = z[i * n + k];
+            for j in 0..n {
+                g[i * n + j] -= left * p[k * n + j];
+            }
+        }
+        z[i * n + i] += 1.0;
+    }
+    // Elimination without pivoting: ‖Z‖₁ ≤ ½.
+    for k in 0..n {
+        let pivot = 1.0 / z[k * n + k];
+        let (above, below) = z.split_at_mut((k + 1) * n);
+        let (g_above, g_below) = g.split_at_mut((k + 1) * n);
+        let (row, g_row) = (&above[k * n..], &g_above[k * n..]);
+        for (r, g_r) in below.chunks_exact_mut(n).zip(g_below.chunks_exact_mut(n)) {
+            let factor = r[k] * pivot;
+            for j in k + 1..n {
+                r[j] -= factor * row[j];
+            }
+            for j in 0..n {
+                g_r[j] -= factor * g_row[j];
+            }
+        }
+    }
+    for k in (0..n).rev() {
+        let pivot = 1.0 / z[k * n + k];
+        let (above, below) = g.split_at_mut((k + 1) * n);
+        let row = &mut above[k * n..];
+        for (m, solved) in (k + 1..n).zip(below.chunks_exact(n)) {
+            let factor = z[k * n + m];
+            for j in 0..n {
+                row[j] -= factor * solved[j];
+            }
+        }
+        for j in 0..n {
+            row[j] *= pivot;
+        }
+    }
+    for i in 0..n {
+        for j in 0..i {
+            let half = 0.5 * (g[i * n + j] + g[j * n + i]);
+            p[i * n + j] += half;
+            p[j * n + i] += half;
+        }
+        p[i * n + i] += g[i * n + i];
+    }
+}
+
+widened! {
+    #[inline(never)]
+    fn advance_small<const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+        advance(N, level, p, z, g);
+    }
+}
+
+widened! {
+    #[inline(never)]
+    fn advance_large(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+        advance(n, level, p, z, g);
+    }
+}
+
+/// Solves eq:RDE backward over the grid of `game`, writing N × N matrices into `nodes`, one after the other. Returns
+/// the number of steps.
+pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
+    let mut flow = Flow::new(game);
+    let (n, grid, width) = (flow.n, game.grid(), Width::detect());
+    let (horizon, steps) = (grid.horizon(), grid.steps());
+    let mut p = vec![0.0; n * n];
+    for (i, f) in game.state_weights(true)[0].iter().enumerate() {
+        p[i * n + i] = f * flow.balance[i] * flow.balance[i];
+    }
+    let (mut z, mut g) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let (mut taken, mut j) = (0, 0_usize);
+    write(&flow, &p, &mut nodes[steps * n * n..]);
+    for k in 1..=steps {
+        // The part of this interval already covered, a sum of powers of two.
+        let mut done = 0.0_f64;
+        while done < 1.0 {
+            if taken % POLL == 0 {
+                cancel.check()?;
+            }
+            let norm = flow.norm_sp(&p);
+            j = j.saturating_sub(1);
+            while !fits(&mut flow, j, norm, 1.0 - done) {
+                j += 1;
+                let s = grid.time(k - 1) + done * flow.step;
+                if j >= LEVELS || taken > steps + STEP_BUDGET || !norm.is_finite() {
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+                    return Err(EquilibriumError::StepBudget { steps: taken, reached: s, horizon });
+                }
+                if flow.step * (-(j as f64)).exp2() < escape::GATE * s {
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+                }
+            }
+            if let Some(level) = &flow.levels[j] {
+                match n {
+                    2 => advance_small::<2>(width, level, &mut p, &mut z, &mut g),
+                    3 => advance_small::<3>(width, level, &mut p, &mut z, &mut g),
+                    4 => advance_small::<4>(width, level, &mut p, &mut z, &mut g),
+                    5 => advance_small::<5>(width, level, &mut p, &mut z, &mut g),
+                    6 => advance_small::<6>(width, level, &mut p, &mut z, &mut g),
+                    7 => advance_small::<7>(width, level, &mut p, &mut z, &mut g),
+                    8 => advance_small::<8>(width, level, &mut p, &mut z, &mut g),
+                    _ => advance_large(width, n, level, &mut p, &mut z, &mut g),
+                }
+            }
+            taken += 1;
+            done += (-(j as f64)).exp2();
+        }
+        write(&flow, &p, &mut nodes[(steps - k) * n * n..]);
+    }
+    escape::check(horizon, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+    Ok(taken)
+}
+
+/// Whether a step of δ 2⁻ʲ stays inside the interval and provably away from every pole.
+fn fits(flow: &mut Flow, j: usize, norm: f64, left: f64) -> bool {
+    if j >= LEVELS || (-(j as f64)).exp2() > left {
+        return false;
+    }
+    if flow.levels[j].is_none() {
+        flow.levels[j] = Some(flow.make_level(j));
+    }
+    flow.levels[j].as_ref().is_some_and(|level| level.bound.0 + norm * level.bound.1 <= BOUND)
+}
+
+/// Undoes the balancing.
+fn write(flow: &Flow, p: &[f64], out: &mut [f64]) {
+    let n = flow.n;
+    for i in 0..n {
+        for j in 0..n {
+            out[i * n + j] = p[i * n + j] / flow.balance[i] / flow.balance[j];
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! How well a stored solution satisfies the Riccati equations as they are printed.
+//!
+//! Residual at t_k, for each group: ‖Ṗ + Q − PA − AᵀP + P S P‖ / (‖Q‖ + 2‖PA‖ + ‖P S P‖), in I2 ‖Ṗ + Q − P S P‖ /
+//! (‖Q‖ + ‖P S P‖), with dense S_p and A as in the paper: nothing is shared with the solvers. Ṗ is the difference of
+//! order 8 of nine stored nodes whose distance is about 1/20 of the time scale of the equation; nothing else is known
+//! of how they came about.
+//!
+//! A grid too coarse for differences is checked step by step: the printed equation is integrated from t_{k+1} to t_k,
+//! and the residual is the mismatch with the stored node, relative to the smaller of ‖P‖ and what a step can change.
+//!
+//! | symbol | name here | meaning |
+//! |---|---|---|
+//! | S_d, S_τ, S_a | `s` | B R⁻¹ Bᵀ, dense; in I2 the one matrix S_a − S_dτ |
+//! | A | `a` | S_d P_d + S_τ P_τ + S_a P_a |
+//! | Q_p | `q` | running weights |
+//!
+//! Source: eq:Riccati and eq:RDE of the paper; Fornberg, *Math. Comp.* 51 (1988), for the differences.
+
+use super::Equilibrium;
+use super::dop853::{self, Flow};
+use super::lanes::LANES;
+use crate::cancel::CancelToken;
+use crate::game::{Game, Interaction};
+
+/// Nodes of a difference.
+const POINTS: usize = 9;
+/// Distance of its nodes times the rate of the equation, at most, where the grid allows a choice.
+const SPACING: f64 = 0.05;
+/// Distance times rate above which a difference is not trusted.
+const COARSE: f64 = 0.15;
+/// Tolerance of a fresh integration.
+const TOLERANCE: f64 = 1e-13;
+
+/// The printed equations.
+struct Textbook {
+    n: usize,
+    interaction: Interaction,
+    s: Vec<Vec<f64>>,
+    q: Vec<Vec<f64>>,
+    block: usize,
+}
+
+/// The right-hand side at one node.
+struct Evaluation {
+    /// dP/ds, (group, i, j).
+    derivative: Vec<f64>,
+    /// Norms of its terms, per group.
+    scale: Vec<f64>,
+    /// How fast the equation can change its solution.
+    rate: f64,
+}
+
+impl Textbook {
+    fn new(game: &Game) -> Self {
+        let (n, w) = (game.size(), game.weights());
+        let diagonal = |d: &[f64]| {
+            let mut m = vec![0.0; n * n];
+            for (i, v) in d.iter().enumerate() {
+                m[i * n + i] = *v;
+            }
+            m
+        };
+        let mut inverse: Vec<f64> = w.r_d.iter().map(|r| 1.0 / r).collect();
+        inverse.push(0.0);
+        let s_d = diagonal(&inverse);
+        let mut last = vec![0.0; n];
+        last[n - 1] = 1.0 / w.r_tau;
+        let s_tau = diagonal(&last);
+        let s_a = vec![1.0 / w.r_a; n * n];
+        let s = match game.interaction() {
+            Interaction::I1 => vec![s_d, s_tau, s_a],
+            Interaction::I2 => vec![(0..n * n).map(|i| s_a[i] - s_d[i] - s_tau[i]).collect()],
+        };
+        let q = game.state_weights(false).iter().map(|q| diagonal(q)).collect();
+        Self { n, interaction: game.interaction(), s, q, block: (n * n).next_multiple_of(LANES) }
+    }
+
+    /// `p`: one N × N matrix per group.
+    fn evaluate(&self, p: &[&[f64]]) -> Evaluation {
+        let n = self.n;
+        let mut a = vec![0.0; n * n];
+        for (s, p) in self.s.iter().zip(p) {
+            for (a, v) in a.iter_mut().zip(multiply(n, s, p)) {
+                *a += v;
+            }
+        }
+        let s_norm = self.s.iter().map(|s| norm(s)).fold(0.0, f64::max);
+        let q_norm = self.q.iter().map(|q| norm(q)).fold(0.0, f64::max);
+        let rate = 2.0 * norm(&a) + (s_norm * q_norm).sqrt();
+        let (mut derivative, mut scale) = (Vec::new(), Vec::new());
+        for ((p, s), q) in p.iter().zip(&self.s).zip(&self.q) {
+            let psp = multiply(n, &multiply(n, p, s), p);
+            match self.interaction {
+                Interaction::I1 => {
+                    let pa = multiply(n, p, &a);
+                    let ap = multiply(n, &transpose(n, &a), p);
+                    derivative.extend((0..n * n).map(|i| q[i] - pa[i] - ap[i] + psp[i]));
+                    scale.push(norm(q) + 2.0 * norm(&pa) + norm(&psp));
+                }
+                Interaction::I2 => {
+                    derivative.extend((0..n * n).map(|i| q[i] - psp[i]));
+                    scale.push(norm(q) + norm(&psp));
+                }
+            }
+        }
+        Evaluation { derivative, scale, rate }
+    }
+}
+
+impl Flow for Textbook {
+    fn block_len(&self) -> usize {
+        self.block
+    }
+    fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
+        let len = self.n * self.n;
+        let p: Vec<&[f64]> = y.chunks_exact(self.block).map(|b| &b[..len]).collect();
+        let value = self.evaluate(&p);
+        for (out, d) in dy.chunks_exact_mut(self.block).zip(value.derivative.chunks_exact(len)) {
+            for i in 0..self.n {
+                for j in 0..self.n {
+                    out[i * self.n + j] = 0.5 * (d[i * self.n + j] + d[j * self.n + i]);
+                }
+            }
+        }
+    }
+}
+
+fn multiply(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; n * n];
+    for (row, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
+        for (a, b) in a.iter().zip(b.chunks_exact(n)) {
+            for (o, b) in row.iter_mut().zip(b) {
+                *o += a * b;
+            }
+        }
+    }
+    out
+}
+
+fn transpose(n: usize, a: &[f64]) -> Vec<f64> {
+    (0..n * n).map(|ij| a[(ij % n) * n + ij / n]).collect()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    a.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// Weights of the derivative at point `at` of nine equidistant points, for unit distance.
+fn difference(at: usize) -> [f64; POINTS] {
+    let binomial = |j: usize| (1..=j).fold(1.0, |b, i| b * (POINTS - i) as f64 / i as f64);
+    let sign = |j: usize| if j % 2 == 0 { 1.0 } else { -1.0 };
+    let mut w = [0.0; POINTS];
+    for j in 0..POINTS {
+        if j != at {
+            w[j] = sign(j) * binomial(j) / (sign(at) * binomial(at)) / (at as f64 - j as f64);
+        }
+    }
+    w[at] = -w.iter().sum::<f64>();
+    w
+}
+
+/// See [`Equilibrium::residual`].
+pub(super) fn residual(equilibrium: &Equilibrium, game: &Game) -> Vec<f64> {
+    let (n, steps, groups) = (equilibrium.size(), equilibrium.steps(), equilibrium.groups());
+    let (len, step) = (n * n, game.grid().step());
+    let mut book = Textbook::new(game);
+    let weights: [[f64; POINTS]; POINTS] = std::array::from_fn(difference);
+    let mut out = vec![0.0; groups * (steps + 1)];
+    for k in 0..=steps {
+        let p: Vec<&[f64]> = (0..groups).map(|g| equilibrium.p(g, k)).collect();
+        let value = book.evaluate(&p);
+        let resolved = steps + 1 >= POINTS && value.rate * step <= COARSE;
+        let stride = ((SPACING / (value.rate * step)) as usize).clamp(1, (steps / (POINTS - 1)).max(1));
+        let fresh = if !resolved && k < steps { again(&mut book, equilibrium, k, step) } else { None };
+        for g in 0..groups {
+            let d = &value.derivative[g * len..(g + 1) * len];
+            let mut worst = 0.0_f64;
+            if resolved {
+                // Nine nodes `stride` apart, centred on k where the ends of the grid allow.
+                let before = (k / stride).min(POINTS / 2).max((POINTS - 1).saturating_sub((steps - k) / stride));
+                let before = before.min(k / stride);
+                let mut defect = d.to_vec();
+                for (j, w) in weights[before].iter().enumerate() {
+                    let node = equilibrium.p(g, k + j * stride - before * stride);
+                    for (x, p) in defect.iter_mut().zip(node) {
+                        *x += w * p / (stride as f64 * step);
+                    }
+                }
+                worst = norm(&defect) / value.scale[g];
+            } else if k < steps {
+                worst = f64::INFINITY;
+                if let Some(fresh) = &fresh {
+                    let defect: Vec<f64> = p[g].iter().zip(&fresh[g * book.block..]).map(|(a, b)| a - b).collect();
+                    worst = norm(&defect) / norm(p[g]).min(step * value.scale[g]);
+                }
+            }
+            if k == steps {
+                let f = &game.state_weights(true)[g];
+                let defect: Vec<f64> =
+                    (0..len).map(|ij| p[g][ij] - if ij / n == ij % n { f[ij / n] } else { 0.0 }).collect();
+                worst = worst.max(norm(&defect) / norm(f));
+            }
+            out[g * (steps + 1) + k] = worst;
+        }
+    }
+    out
+}
+
+/// P at t_k from the stored P at t_{k+1}, as a padded stack.
+fn again(book: &mut Textbook, equilibrium: &Equilibrium, k: usize, step: f64) -> Option<Vec<f64>> {
+    let len = equilibrium.size() * equilibrium.size();
+    let mut y = vec![0.0; equilibrium.groups() * book.block];
+    for (block, p) in y.chunks_exact_mut(book.block).zip(equilibrium.node(k + 1).chunks_exact(len)) {
+        block[..len].copy_from_slice(p);
+    }
+    let mut last = None;
+    let keep = &mut |j: usize, y: &[f64]| {
+        if j == 1 {
+            last = Some(y.to_vec());
+        }
+    };
+    dop853::integrate(book, &y, step, 1, TOLERANCE, &CancelToken::new(), keep).ok()?;
+    last
+}
