@@ -139,6 +139,7 @@ def test_a_run_converges_and_says_so(run):
     assert run.converged
     assert run.unconverged == 0
     assert run.iterations > 0
+    assert 0 < run.certified <= len(run.times)
 
 
 @pytest.mark.parametrize(
