@@ -1,5 +1,30 @@
-//! Bindings.
+//! Bindings: convert, call, convert. Nothing is computed here.
+
+mod arrays;
+mod detach;
+mod equilibrium;
+mod errors;
+mod gains;
+mod game;
+mod record;
+
 use pyo3::prelude::*;
 
+/// The compiled core of tadcore.
 #[pymodule]
-mod _core {}
+mod _core {
+    #[pymodule_export]
+    use super::equilibrium::Equilibrium;
+    #[pymodule_export]
+    use super::gains::Gains;
+    #[pymodule_export]
+    use super::game::Game;
+    #[pymodule_export]
+    use super::record::Record;
+    use super::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,5 +1,47 @@
-//! tadcore: target-attacker-defender differential games with limited observations.
+//! # tadcore
+//!
+//! Target–attacker–defender differential games with limited observations, after Singh and Reddy, *Dynamic network
+//! analysis of a target defense differential game with limited observations*.
+//!
+//! A target flees an attacker; defenders try to intercept the attacker first. Defenders (and in interaction I2 the
+//! target) see only what lies within their visibility radius. This crate computes the feedback Nash equilibrium, the
+//! network-adapted gains of the players that see too little, single recorded runs and large ensembles of runs. It knows
+//! nothing of Python; the bindings live in a crate of their own.
+//!
+//! ## Layers
+//!
+//! Each layer uses only layers above it in this table (asserted by a test).
+//!
+//! | layer | what it knows |
+//! |---|---|
+//! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
+//! | [`game`] | weights, horizon and grid, checked; reference games |
+//! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
+//! | [`network`] | who sees whom; what each player may use |
+//! | [`synthesis`] | the gains at one (instant, topology) |
+//! | [`policy`] | closed loop, one-step transition, the shared (step, topology) table |
+//! | [`simulation`] | one recorded run |
+//! | [`cost`] | J of every player along a run |
+//! | [`ensemble`] | many runs, outcomes only |
+//!
+//! ## Reduced matrices
+//!
+//! Every weight of the paper is a scalar times **I**₂, so every matrix is a small factor ⊗ **I**₂ and only the factor is
+//! computed with: N × N instead of 2N × 2N, N = n + 1. The number of axes never enters a solve; the plane and space use
+//! the same game.
+//!
+//! ## Small and large games
+//!
+//! Up to N = 8 kernels are compiled for their size and live on the stack (nalgebra where a matrix type helps); larger
+//! games use faer's blocked kernels, single-threaded. Each module that switches says why, by measurement.
+
 pub mod cancel;
+pub mod cost;
+pub mod ensemble;
 pub mod error;
 pub mod game;
+pub mod network;
+pub mod policy;
 pub mod riccati;
+pub mod simulation;
+pub mod synthesis;

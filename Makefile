@@ -1,0 +1,67 @@
+# tadcore: what one can do here. `make` or `make help` lists the targets.
+#
+# Everything Python happens in .venv; Rust builds land in target/. Both are made on first use.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+OUT    ?= out
+STAMP  := $(VENV)/.installed
+RUST   := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-rust test-python lint format bench peers docs check clean
+
+help:  ## list the targets
+	@echo "tadcore: target-attacker-defender games with limited observations"
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | awk -F'\t' '{printf "  make %-12s %s\n", $$1, $$2}'
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+$(STAMP): $(BIN)/python pyproject.toml $(RUST)
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@touch $@
+
+setup: $(STAMP)  ## make .venv and install tadcore into it (compiles the core)
+
+demo: $(STAMP)  ## reproduce the paper: every run of section 6, computed, compared and drawn into $(OUT)/
+	$(BIN)/tadcore reproduce --out $(OUT)
+
+test: test-rust test-python  ## run every test, Rust and Python
+
+test-rust:
+	cargo test --release --locked
+
+test-python: $(STAMP)
+	$(BIN)/python -m pytest
+	$(BIN)/python -m mypy.stubtest tadcore._core
+
+lint: $(STAMP)  ## format check, clippy, rustdoc, ruff, mypy: warnings are errors
+	cargo fmt --all --check
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	cargo clippy --workspace --all-targets --locked -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+	$(BIN)/mypy
+
+format:  ## rewrite sources in the project's format
+	cargo fmt --all
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+bench:  ## Criterion benchmarks of the core
+	cargo bench
+
+peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process run each
+	$(BIN)/python -m pip install --quiet '.[bench]'
+	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
+
+docs:  ## the core's API documentation, warnings are errors
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+check: lint test  ## everything that must pass before a change lands
+
+clean:  ## remove what the other targets made
+	rm -rf $(VENV) $(OUT) target dist build

@@ -1,0 +1,72 @@
+"""Reading TOML with errors that name the line, and writing files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from .errors import MISSING, ScenarioError
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a file; raises `ScenarioError` where there is none."""
+    name = os.fspath(path)
+    try:
+        return Path(name).read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise ScenarioError(name, MISSING, "a file that exists") from None
+    except IsADirectoryError:
+        raise ScenarioError(name, "a folder", "a file") from None
+    except UnicodeDecodeError as error:
+        raise ScenarioError(name, error.object[error.start : error.end], "text in UTF-8") from None
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise ScenarioError(name, reason, "a file that can be read") from None
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """The tables of a TOML text; raises `ScenarioError` naming the line that cannot be read."""
+    try:
+        return tomllib.loads(text)
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # a TOMLDecodeError, or a number or a nesting beyond all bounds
+        place = re.search(r"\(at line (\d+), column \d+\)", str(error))
+        reason = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
+        if "digits" in reason:
+            reason = "an integer has too many digits"
+        if isinstance(error, RecursionError):
+            reason = "arrays or tables are nested too deeply"
+        if place is None:
+            last = "at end of document" in str(error)
+            raise ScenarioError(f"{name}, at the end" if last else name, MISSING, f"valid TOML ({reason})") from None
+        line = int(place[1])
+        found = text.split("\n")[line - 1].strip() if line <= text.count("\n") + 1 else MISSING
+        raise ScenarioError(f"{name}, line {line}", found, f"valid TOML ({reason})") from None
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write beside the destination, then rename onto it, so that no reader meets half a file."""
+    destination = Path(path)
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    descriptor, name = tempfile.mkstemp(prefix=f".{destination.name}.", dir=destination.parent)
+    partial = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(data)
+        partial.chmod(0o666 & ~_umask())
+        partial.replace(destination)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,165 @@
+"""What can go wrong, and what each error carries.
+
+Every class also derives from the built-in that fits, so that ``except ValueError`` works for bad input and
+``except ArithmeticError`` for a game that has no equilibrium. All of them can be pickled, so they travel whole from a
+worker process.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import reprlib
+from collections.abc import Iterable
+from decimal import Decimal
+
+__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "TadcoreError"]
+
+
+class Missing(enum.Enum):
+    """The value of a field that was not given at all."""
+
+    MISSING = "nothing"
+
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+MISSING = Missing.MISSING
+
+
+class TadcoreError(Exception):
+    """The base of every error of this library."""
+
+
+class ScenarioError(TadcoreError, ValueError):
+    """A number, a name or a file that cannot be accepted.
+
+    Parameters
+    ----------
+    field : str
+        Path of the field, such as ``"defenders[1].visibility_radius"`` or ``"positions[17, 2, 0]"``.
+    value : object
+        What was found there; `MISSING` where nothing was.
+    rule : str
+        What it must be; it completes the sentence "must be …".
+
+    Attributes
+    ----------
+    errors : tuple of ScenarioError
+        One error for each offending field; of length one unless several fields are wrong at once.
+    """
+
+    def __init__(self, field: str, value: object, rule: str) -> None:
+        super().__init__(field, value, rule)
+        self.field = field
+        self.value = value
+        self.rule = rule
+        self.errors: tuple[ScenarioError, ...] = (self,)
+
+    @classmethod
+    def collect(cls, errors: Iterable[ScenarioError]) -> ScenarioError:
+        """One error that lists all of ``errors``; field, value and rule are the first one's."""
+        flat = tuple(single for error in errors for single in error.errors)
+        if len(flat) == 1:
+            return flat[0]
+        first = flat[0]
+        several = cls(first.field, first.value, first.rule)
+        several.errors = flat
+        return several
+
+    def __str__(self) -> str:
+        if len(self.errors) == 1:
+            return f"{self.field}: got {_shorten(self.value)}, must be {self.rule}"
+        lines = "".join(f"\n  {error}" for error in self.errors)
+        return f"{len(self.errors)} fields cannot be accepted:{lines}"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        if len(self.errors) == 1:
+            return type(self), (self.field, self.value, self.rule)
+        return _collect, (type(self), self.errors)
+
+
+class NoEquilibriumError(TadcoreError, ArithmeticError):
+    """The game has no feedback Nash equilibrium on [0, T].
+
+    The Riccati solution, followed backward from the horizon, escapes to infinity before it reaches t = 0. That is a
+    property of the game, not a numerical failure.
+
+    Parameters
+    ----------
+    escape_time : float
+        Backward time, measured from the horizon, at which the solution escapes. The Riccati equations do not depend
+        on time, so an equilibrium exists for every horizon shorter than this and for none longer.
+    horizon : float
+        T.
+    step : float
+        δ.
+
+    Attributes
+    ----------
+    escape_instant : float
+        The same escape in game time, ``horizon - escape_time``.
+    longest_horizon : float
+        The largest multiple of δ below ``escape_time``: the longest horizon on this grid for which an equilibrium
+        exists; 0.0 where not even one step has one.
+    """
+
+    def __init__(self, escape_time: float, horizon: float, step: float) -> None:
+        super().__init__(escape_time, horizon, step)
+        self.escape_time = float(escape_time)
+        self.horizon = float(horizon)
+        self.step = float(step)
+
+    @property
+    def escape_instant(self) -> float:
+        """Game time at which the Riccati solution escapes."""
+        return self.horizon - self.escape_time
+
+    @property
+    def longest_horizon(self) -> float:
+        """The longest horizon on this grid for which an equilibrium exists; 0.0 where there is none."""
+        whole = max(math.ceil(self.escape_time / self.step) - 1, 0)
+        # Multiples are formed in decimal, so that 3 steps of 0.1 read 0.3; and so do 3 steps of 0.3 / 3.
+        while whole > 0 and _multiple(self.step, whole) >= self.escape_time:
+            whole -= 1
+        return _multiple(self.step, whole)
+
+    def __str__(self) -> str:
+        advice = (
+            f"the longest horizon on the grid of step {self.step:g} is {self.longest_horizon!r}"
+            if self.longest_horizon > 0.0
+            else f"not even one step of {self.step:g} is short enough"
+        )
+        return (
+            f"the game has no feedback Nash equilibrium on [0, {self.horizon:g}]: followed back from the horizon, "
+            f"the Riccati solution escapes to infinity after {self.escape_time!r}, at t = {self.escape_instant:.6g}. "
+            f"An equilibrium exists only for horizons shorter than {self.escape_time!r}; {advice}"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.escape_time, self.horizon, self.step)
+
+
+def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:
+    return cls.collect(errors)
+
+
+def _multiple(step: float, count: int) -> float:
+    return float(Decimal(f"{step:.15g}") * count)
+
+
+_reader = reprlib.Repr()
+_reader.maxstring = _reader.maxother = 60
+_reader.maxlist = _reader.maxtuple = _reader.maxarray = 4
+_reader.maxlong = 24
+
+
+def _shorten(value: object) -> str:
+    """A readable form of any value, never long and never raising."""
+    tolist = getattr(value, "tolist", None)  # NumPy arrays and scalars read better as Python numbers
+    try:
+        return _reader.repr(tolist() if callable(tolist) else value)
+    except Exception:  # an integer past Python's limit of printed digits, an object whose repr is broken
+        long = f"an integer of {value.bit_length() * 0.30103:.0f} digits" if isinstance(value, int) else None
+        return long or f"<{type(value).__name__}>"

@@ -1,0 +1,27 @@
+"""Figures of a run, as the field prints them.
+
+Every function draws in the axes it is given, or in new ones, and returns them; none changes a global setting. Figures
+read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
+"""
+
+from ._labels import Labels
+from ._network import network
+from ._save import save
+from ._series import MAX_VERTICALS, controls, distances, theta
+from ._style import COLUMN, PAGE, style
+from ._trajectories import MAX_EDGE_LABELS, trajectories
+
+__all__ = [
+    "COLUMN",
+    "MAX_EDGE_LABELS",
+    "MAX_VERTICALS",
+    "PAGE",
+    "Labels",
+    "controls",
+    "distances",
+    "network",
+    "save",
+    "style",
+    "theta",
+    "trajectories",
+]

@@ -1,0 +1,164 @@
+"""One game, everything recorded.
+
+At every instant t_k of the grid: termination, the network from the distances (eq:limob of Singh and Reddy), the gains
+for that network (eq:optproblem, eq:optproblem2), then one step of the closed loop with its matrix frozen,
+z(t_{k+1}) = exp(C_k δ) z(t_k). Everything is dimensionless, as in the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._game import game_of
+from .network import Interval, NetworkChange, changes_of, intervals_of
+from .outcome import Outcome
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray
+
+    from ._plots import Plots
+    from .scenario import Scenario
+
+__all__ = ["Run", "simulate"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """A game from its start to its end; made by `simulate`.
+
+    The record has L + 1 rows, t_0 … t_L, the last of them the terminal state. m is the number of players with limited
+    sight (n in I1, n + 1 in I2) and N = n + 1.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What was played.
+    outcome : Outcome
+        How it ended.
+    times : ndarray, shape (L + 1,)
+        Instants.
+    position, control : ndarray, shape (L + 1, n + 2, dim)
+        Positions and controls (velocities) in the order of ``scenario.players``. The last control is the feedback at
+        the terminal state under the last network in force.
+    adjacency : ndarray of bool, shape (L + 1, m, N)
+        𝒜 at every instant; the last row repeats the last network in force.
+    gains : ndarray, shape (L + 1, m, N)
+        Rows of the feedback of the players with limited sight.
+    theta : ndarray, shape (L + 1,)
+        Θ₁ or Θ₂, in reduced norms.
+    theta_terms : ndarray, shape (L + 1, 4 or 3)
+        Its terms, unweighted.
+    costs : dict of str to float
+        J over [0, outcome.time], terminal term included: ``"defenders"``, ``"target"``, ``"attacker"`` in I1
+        (eq:fullobj), ``"team"`` in I2, which the attacker minimises and the team maximises (eq:obj:zero_sum).
+    iterations : int
+        Steps of the synthesis solver, all instants together.
+    unconverged : int
+        Instants at which the synthesis stopped short of its tolerance.
+    """
+
+    scenario: Scenario
+    outcome: Outcome
+    times: NDArray[np.float64]
+    position: NDArray[np.float64]
+    control: NDArray[np.float64]
+    adjacency: NDArray[np.bool_]
+    gains: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    theta_terms: NDArray[np.float64]
+    costs: dict[str, float]
+    iterations: int
+    unconverged: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the gains of every instant reached the tolerance."""
+        return self.unconverged == 0
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The record as a labelled dataset over (time, player, axis), with symbols and sources in its attributes."""
+        from ._dataset import dataset_of
+
+        return dataset_of(self)
+
+    @cached_property
+    def network_changes(self) -> tuple[NetworkChange, ...]:
+        """(time, edges added, edges removed) wherever the network changes, the initial network first."""
+        in_force = max(len(self.times) - 1, 1)
+        return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
+
+    def intervals(self) -> tuple[Interval, ...]:
+        """(start, end, edges) of the stretches with one network, the last up to the end of the game."""
+        return intervals_of(self.network_changes, self.outcome.time)
+
+    @property
+    def plot(self) -> Plots:
+        """Figures of this run: ``run.plot.trajectories()``, ``.network()``, ``.controls()``."""
+        from ._plots import Plots
+
+        return Plots(self)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``run.nc`` (netCDF 3), ``scenario.toml`` and ``summary.json``, each whole or not at all."""
+        from ._dataset import save
+
+        save(self, folder)
+
+    def __repr__(self) -> str:
+        changes = len(self.network_changes) - 1
+        network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
+        warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
+        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{warning})"
+
+
+def simulate(sc: Scenario) -> Run:
+    """Play a scenario and record everything.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game and its start.
+
+    Returns
+    -------
+    Run
+        The outcome, the trajectories, the network, Θ and the costs.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+    >>> print(run.outcome)
+    d1 intercepts the attacker at t = 1.395
+    >>> [change.time for change in run.network_changes]
+    [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
+    """
+    record = game_of(sc).simulate(sc.positions, sc.visibility_radii, sc.capture_radii)
+    groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
+    return Run(
+        scenario=sc,
+        outcome=Outcome.of(record.kind, record.defender, record.time),
+        times=record.times,
+        position=record.position,
+        control=record.control,
+        adjacency=record.adjacency,
+        gains=record.gains,
+        theta=record.theta,
+        theta_terms=record.theta_terms,
+        costs=dict(zip(groups, map(float, record.costs), strict=True)),
+        iterations=record.iterations,
+        unconverged=record.unconverged,
+    )

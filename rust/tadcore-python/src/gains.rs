@@ -1,0 +1,91 @@
+//! `Gains`: the answer of one synthesis.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use tadcore::network::Topology;
+use tadcore::synthesis::{Gains as CoreGains, Look, Status};
+
+use super::arrays::shaped;
+
+/// The gains at one (instant, topology).
+#[pyclass(frozen, module = "tadcore._core")]
+pub(crate) struct Gains {
+    gains: CoreGains,
+    terms: Vec<f64>,
+    topology: Topology,
+}
+
+impl Gains {
+    pub(crate) fn new(gains: CoreGains, terms: Vec<f64>, topology: Topology) -> Self {
+        Self { gains, terms, topology }
+    }
+}
+
+#[pymethods]
+impl Gains {
+    /// Gain rows, shape (m, N): u_i = rows[i] @ z.
+    #[getter]
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        shaped(py, &self.gains.rows, (self.topology.rows(), self.topology.size()))
+    }
+
+    /// Scalar factors of the paper's K, shape (m, N).
+    #[getter]
+    #[allow(non_snake_case)]
+    fn K<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        shaped(py, &self.gains.paper_gains(&self.topology), (self.topology.rows(), self.topology.size()))
+    }
+
+    /// Θ, reduced.
+    #[getter]
+    fn theta(&self) -> f64 {
+        self.gains.theta
+    }
+
+    /// Unweighted squared norms, in the order of the synthesis weights.
+    #[getter]
+    fn terms<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.terms)
+    }
+
+    /// Relative norm of the gradient at the end.
+    #[getter]
+    fn gradient_norm(&self) -> f64 {
+        self.gains.gradient_norm
+    }
+
+    /// Iterations of all descents together.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.gains.iterations
+    }
+
+    /// Whether the gradient fell below the tolerance.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.gains.status == Status::Converged
+    }
+
+    /// How the solver ended: converged, stalled or iteration_limit.
+    #[getter]
+    fn status(&self) -> &'static str {
+        self.gains.status.name()
+    }
+
+    /// Whether the minimum is proved to be global.
+    #[getter]
+    fn certified(&self) -> bool {
+        self.gains.certified
+    }
+
+    /// The look that found the minimum: canonical, complex, stacked or reversed.
+    #[getter]
+    fn look(&self) -> &'static str {
+        match self.gains.look {
+            Look::Canonical => "canonical",
+            Look::Complex => "complex",
+            Look::Stacked => "stacked",
+            Look::Reversed => "reversed",
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! `Game`: weights and grid, and with them the equilibrium and the table that all its runs share.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tadcore::cancel::CancelToken;
+use tadcore::ensemble::{self, Batch};
+use tadcore::error::EquilibriumError;
+use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
+use tadcore::network::Topology;
+use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
+use tadcore::simulation::{self, Setup};
+use tadcore::synthesis::{Method, Options, Synthesizer};
+
+use super::equilibrium::Equilibrium;
+use super::gains::Gains;
+use super::record::Record;
+use super::{detach, errors};
+
+/// Weights, horizon and grid; owns the equilibrium and the (step, topology) table.
+#[pyclass(frozen, module = "tadcore._core")]
+pub(crate) struct Game {
+    game: CoreGame,
+    table_bytes: usize,
+    policy: Mutex<Option<Arc<Policy>>>,
+}
+
+fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
+    array.map(|a| a.as_array().iter().copied().collect()).unwrap_or_default()
+}
+
+impl Game {
+    /// The policy, solving the equilibrium on first use. An error is found again, not kept: it is cheap to find.
+    fn policy(&self, py: Python<'_>) -> PyResult<Arc<Policy>> {
+        detach::interruptible(py, |cancel| self.solved(cancel))?
+            .map_err(|error| errors::equilibrium(py, &self.game, &error))
+    }
+
+    fn solved(&self, cancel: &CancelToken) -> Result<Arc<Policy>, EquilibriumError> {
+        let mut held = self.policy.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(policy) = &*held {
+            return Ok(Arc::clone(policy));
+        }
+        let policy = Arc::new(Policy::new(self.game.clone(), self.table_bytes, cancel)?);
+        *held = Some(Arc::clone(&policy));
+        Ok(policy)
+    }
+}
+
+#[pymethods]
+impl Game {
+    #[new]
+    #[pyo3(signature = (*, interaction, horizon, step, defender_control_weight, target_control_weight,
+        attacker_control_weight, defender_running_weight=None, defender_terminal_weight=None,
+        target_running_weight=1.0, target_terminal_weight=1.0, attacker_target_running_weight=1.0,
+        attacker_target_terminal_weight=1.0, evasion_running_weight, evasion_terminal_weight, evasion=1.0,
+        synthesis_weights, table_bytes=None))]
+    fn new(
+        py: Python<'_>,
+        interaction: &str,
+        horizon: f64,
+        step: f64,
+        defender_control_weight: PyReadonlyArray1<'_, f64>,
+        target_control_weight: f64,
+        attacker_control_weight: f64,
+        defender_running_weight: Option<PyReadonlyArray1<'_, f64>>,
+        defender_terminal_weight: Option<PyReadonlyArray1<'_, f64>>,
+        target_running_weight: f64,
+        target_terminal_weight: f64,
+        attacker_target_running_weight: f64,
+        attacker_target_terminal_weight: f64,
+        evasion_running_weight: PyReadonlyArray1<'_, f64>,
+        evasion_terminal_weight: PyReadonlyArray1<'_, f64>,
+        evasion: f64,
+        synthesis_weights: PyReadonlyArray1<'_, f64>,
+        table_bytes: Option<usize>,
+    ) -> PyResult<Self> {
+        let interaction = match interaction {
+            "I1" => Interaction::I1,
+            "I2" => Interaction::I2,
+            other => return Err(PyValueError::new_err(format!("interaction is {other:?}, but it must be I1 or I2"))),
+        };
+        let weights = Weights {
+            r_d: numbers(Some(defender_control_weight)),
+            r_tau: target_control_weight,
+            r_a: attacker_control_weight,
+            q_da: numbers(defender_running_weight),
+            f_da: numbers(defender_terminal_weight),
+            q_ad: numbers(Some(evasion_running_weight)),
+            f_ad: numbers(Some(evasion_terminal_weight)),
+            q_atau: attacker_target_running_weight,
+            f_atau: attacker_target_terminal_weight,
+            q_taua: target_running_weight,
+            f_taua: target_terminal_weight,
+            lambda: evasion,
+            gamma: numbers(Some(synthesis_weights)),
+        };
+        let game = Grid::new(horizon, step)
+            .and_then(|grid| CoreGame::new(interaction, weights, grid))
+            .map_err(|error| errors::game(py, error))?;
+        Ok(Self { game, table_bytes: table_bytes.unwrap_or(DEFAULT_TABLE_BYTES), policy: Mutex::new(None) })
+    }
+
+    /// Number of defenders.
+    #[getter]
+    fn defenders(&self) -> usize {
+        self.game.n()
+    }
+
+    /// K, the number of steps of the grid.
+    #[getter]
+    fn steps(&self) -> usize {
+        self.game.grid().steps()
+    }
+
+    /// t_0 … t_K.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let grid = self.game.grid();
+        PyArray1::from_iter(py, (0..=grid.steps()).map(|k| grid.time(k)))
+    }
+
+    /// The equilibrium, solved on first use.
+    fn equilibrium(&self, py: Python<'_>) -> PyResult<Equilibrium> {
+        Ok(Equilibrium::new(self.policy(py)?))
+    }
+
+    /// The gains at t_step under an adjacency of shape (m, N).
+    #[pyo3(signature = (step, adjacency, *, method="newton", max_iterations=None))]
+    fn synthesize(
+        &self,
+        py: Python<'_>,
+        step: usize,
+        adjacency: PyReadonlyArray2<'_, bool>,
+        method: &str,
+        max_iterations: Option<usize>,
+    ) -> PyResult<Gains> {
+        let seen = adjacency.as_array();
+        let (m, n) = (self.game.constrained(), self.game.size());
+        if seen.dim() != (m, n) || step > self.game.grid().steps() {
+            return Err(PyValueError::new_err(format!(
+                "step must be at most {} and adjacency of shape ({m}, {n})",
+                self.game.grid().steps()
+            )));
+        }
+        let mut options = Options::new(match method {
+            "newton" => Method::Newton,
+            "descent" => Method::Descent,
+            other => return Err(PyValueError::new_err(format!("method is {other:?}; it must be newton or descent"))),
+        });
+        if let Some(limit) = max_iterations {
+            options.max_iterations = limit;
+        }
+        let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
+        let policy = self.policy(py)?;
+        let (gains, terms) = detach::interruptible(py, |_| {
+            let problem = policy.problem(step);
+            let gains = Synthesizer::new().solve(&problem, &topology, options);
+            let terms = problem.terms(policy.equilibrium().node(step), &gains.rows);
+            (gains, terms)
+        })?;
+        Ok(Gains::new(gains, terms, topology))
+    }
+
+    /// One recorded run.
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        positions: PyReadonlyArray2<'_, f64>,
+        visibility_radii: PyReadonlyArray1<'_, f64>,
+        capture_radii: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Record> {
+        let dim = positions.as_array().ncols();
+        let flat: Vec<f64> = positions.as_array().iter().copied().collect();
+        let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
+        let policy = self.policy(py)?;
+        let record = detach::interruptible(py, |cancel| {
+            let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
+            simulation::simulate(&policy, &setup, cancel)
+        })?
+        .map_err(|error| errors::run(py, &self.game, error))?;
+        Ok(Record::new(policy, record))
+    }
+
+    /// Outcomes of many runs: kind, defender, time.
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, threads=None))]
+    #[allow(clippy::type_complexity)]
+    fn simulate_batch<'py>(
+        &self,
+        py: Python<'py>,
+        positions: PyReadonlyArray3<'py, f64>,
+        visibility_radii: PyReadonlyArray2<'py, f64>,
+        capture_radii: PyReadonlyArray2<'py, f64>,
+        threads: Option<usize>,
+    ) -> PyResult<(Bound<'py, PyArray1<i8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)> {
+        let dim = positions.as_array().dim().2;
+        let (positions, visibility, capture) =
+            (positions.as_slice()?, visibility_radii.as_slice()?, capture_radii.as_slice()?);
+        let policy = self.policy(py)?;
+        let ends = detach::interruptible(py, |cancel| {
+            let batch = Batch { dim, positions, visibility, capture };
+            ensemble::run(&policy, &batch, threads, cancel)
+        })?
+        .map_err(|error| errors::run(py, &self.game, error))?;
+        let grid = self.game.grid();
+        Ok((
+            PyArray1::from_iter(py, ends.iter().map(|(outcome, _)| outcome.code())),
+            PyArray1::from_iter(py, ends.iter().map(|(outcome, _)| outcome.defender())),
+            PyArray1::from_iter(py, ends.iter().map(|&(_, k)| grid.time(k))),
+        ))
+    }
+
+    /// What the (step, topology) table has done so far.
+    fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let held = self.policy.lock().unwrap_or_else(PoisonError::into_inner);
+        let stats = held.as_ref().map(|policy| policy.table()).unwrap_or_default();
+        let out = PyDict::new(py);
+        out.set_item("entries", stats.entries)?;
+        out.set_item("hits", stats.hits)?;
+        out.set_item("misses", stats.misses)?;
+        out.set_item("bytes", stats.bytes)?;
+        out.set_item("capacity", self.table_bytes)?;
+        Ok(out)
+    }
+}

@@ -1,0 +1,125 @@
+//! `Record`: one recorded run as NumPy arrays.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use tadcore::cost;
+use tadcore::policy::Policy;
+use tadcore::simulation::Record as CoreRecord;
+
+use super::arrays::shaped;
+use super::detach;
+
+/// One recorded run of L steps: rows 0…L, the last the terminal state.
+#[pyclass(frozen, module = "tadcore._core")]
+pub(crate) struct Record {
+    policy: Arc<Policy>,
+    record: CoreRecord,
+}
+
+impl Record {
+    pub(crate) fn new(policy: Arc<Policy>, record: CoreRecord) -> Self {
+        Self { policy, record }
+    }
+
+    fn rows(&self) -> usize {
+        self.record.steps + 1
+    }
+
+    fn players(&self) -> usize {
+        self.policy.game().n() + 2
+    }
+}
+
+#[pymethods]
+impl Record {
+    /// Code of the outcome: timeout 0, captured 1, intercepted 2.
+    #[getter]
+    fn kind(&self) -> i8 {
+        self.record.outcome.code()
+    }
+
+    /// The defender that intercepted, −1 where none did.
+    #[getter]
+    fn defender(&self) -> i32 {
+        self.record.outcome.defender()
+    }
+
+    /// Time of termination.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.policy.game().grid().time(self.record.steps)
+    }
+
+    /// Times of the rows.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, (0..self.rows()).map(|k| self.policy.game().grid().time(k)))
+    }
+
+    /// Positions, shape (L + 1, n + 2, dim).
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        shaped(py, &self.record.positions, (self.rows(), self.players(), self.record.dim))
+    }
+
+    /// Velocities, shape (L + 1, n + 2, dim).
+    #[getter]
+    fn control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        shaped(py, &self.record.controls, (self.rows(), self.players(), self.record.dim))
+    }
+
+    /// 𝒜, shape (L + 1, m, N).
+    #[getter]
+    fn adjacency<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<bool>>> {
+        let (m, n) = (self.policy.game().constrained(), self.policy.game().size());
+        let seen: Vec<bool> =
+            self.record.networks.iter().flat_map(|t| (0..m * n).map(|e| t.sees(e / n, e % n))).collect();
+        shaped(py, &seen, (self.rows(), m, n))
+    }
+
+    /// Gain rows, shape (L + 1, m, N).
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let game = self.policy.game();
+        shaped(py, &self.record.gains, (self.rows(), game.constrained(), game.size()))
+    }
+
+    /// Θ at each row, reduced.
+    #[getter]
+    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.record.theta)
+    }
+
+    /// Terms of Θ, unweighted and reduced, shape (L + 1, 4 or 3).
+    #[getter]
+    fn theta_terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        shaped(py, &self.record.terms, (self.rows(), self.policy.game().interaction().terms()))
+    }
+
+    /// J of each player: J_d, J_τ, J_a in I1, J in I2.
+    #[getter]
+    fn costs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let costs = detach::interruptible(py, |_| cost::costs(&self.policy, &self.record))?;
+        Ok(PyArray1::from_vec(py, costs))
+    }
+
+    /// Iterations of all syntheses.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.record.iterations
+    }
+
+    /// Rows whose synthesis stopped short of its tolerance.
+    #[getter]
+    fn unconverged(&self) -> usize {
+        self.record.unconverged
+    }
+
+    /// Rows whose gains are proved to be globally optimal.
+    #[getter]
+    fn certified(&self) -> usize {
+        self.record.certified
+    }
+}

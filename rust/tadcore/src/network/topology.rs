@@ -1,0 +1,149 @@
+//! A visibility network as a set of bits, for any number of players.
+//!
+//! Bit i·N + j is entry (i, j) of the augmented adjacency matrix 𝒜 (eq:extadj): for j ≠ i "player i sees player j", for
+//! j = i "player i sees the attacker". Rows are the players with limited observations (d₁…d_n; in I2 also τ).
+//! Up to 64 bits lie inline, more (n ≥ 8) on the heap; no size is refused.
+
+/// A visibility network: who sees whom at one instant.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Topology {
+    rows: usize,
+    size: usize,
+    words: Words,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Words {
+    Inline(u64),
+    Heap(Box<[u64]>),
+}
+
+impl Topology {
+    /// The empty network of `rows` constrained players among `size` = N.
+    #[must_use]
+    pub fn empty(rows: usize, size: usize) -> Self {
+        let bits = rows * size;
+        let words = if bits <= 64 { Words::Inline(0) } else { Words::Heap(vec![0; bits.div_ceil(64)].into()) };
+        Self { rows, size, words }
+    }
+
+    /// The network in which every constrained player sees everyone.
+    #[must_use]
+    pub fn complete(rows: usize, size: usize) -> Self {
+        Self::from_fn(rows, size, |_, _| true)
+    }
+
+    /// The network whose entry (i, j) is `seen(i, j)`.
+    #[must_use]
+    pub fn from_fn(rows: usize, size: usize, seen: impl Fn(usize, usize) -> bool) -> Self {
+        let mut topology = Self::empty(rows, size);
+        for i in 0..rows {
+            for j in 0..size {
+                if seen(i, j) {
+                    topology.set(i, j);
+                }
+            }
+        }
+        topology
+    }
+
+    /// The network with the bits of `key`, for at most 64 entries.
+    #[must_use]
+    pub fn from_key(rows: usize, size: usize, key: u64) -> Self {
+        debug_assert!(rows * size <= 64, "a key holds at most 64 entries");
+        Self { rows, size, words: Words::Inline(key) }
+    }
+
+    /// The bits as one number, when there are at most 64.
+    #[must_use]
+    pub fn key(&self) -> Option<u64> {
+        match self.words {
+            Words::Inline(key) => Some(key),
+            Words::Heap(_) => None,
+        }
+    }
+
+    /// The bits, 64 a word.
+    #[must_use]
+    pub fn words(&self) -> &[u64] {
+        match &self.words {
+            Words::Inline(word) => std::slice::from_ref(word),
+            Words::Heap(words) => words,
+        }
+    }
+
+    /// Constrained players.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// N.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Entry (i, j) of 𝒜.
+    #[must_use]
+    pub fn sees(&self, i: usize, j: usize) -> bool {
+        let bit = i * self.size + j;
+        self.words()[bit / 64] >> (bit % 64) & 1 == 1
+    }
+
+    /// Whether player i sees the attacker.
+    #[must_use]
+    pub fn sees_attacker(&self, i: usize) -> bool {
+        self.sees(i, i)
+    }
+
+    /// Sets entry (i, j) of 𝒜.
+    pub fn set(&mut self, i: usize, j: usize) {
+        let bit = i * self.size + j;
+        let words = match &mut self.words {
+            Words::Inline(word) => std::slice::from_mut(word),
+            Words::Heap(words) => words,
+        };
+        words[bit / 64] |= 1 << (bit % 64);
+    }
+
+    /// Forgets every edge.
+    pub fn clear(&mut self) {
+        match &mut self.words {
+            Words::Inline(word) => *word = 0,
+            Words::Heap(words) => words.fill(0),
+        }
+    }
+
+    /// Whether everyone sees everyone.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.edges() == self.rows * self.size
+    }
+
+    /// Number of edges.
+    #[must_use]
+    pub fn edges(&self) -> usize {
+        self.words().iter().map(|w| w.count_ones() as usize).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_of_any_size_are_kept_apart() {
+        for (rows, size) in [(1, 2), (3, 4), (8, 8), (8, 9), (40, 41)] {
+            for i in 0..rows {
+                for j in 0..size {
+                    let mut t = Topology::empty(rows, size);
+                    t.set(i, j);
+                    assert_eq!(t.edges(), 1);
+                    assert!(t.sees(i, j));
+                }
+            }
+            assert!(Topology::complete(rows, size).is_complete());
+        }
+    }
+}

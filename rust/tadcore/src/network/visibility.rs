@@ -1,0 +1,66 @@
+//! Who sees whom: ‖z_i − z_j‖ ≤ ζ_i and ‖z_i‖ ≤ ζ_i for the attacker (eq:limob, closed balls).
+//!
+//! Distances are compared by their squares against the largest double whose rounded root does not exceed the radius, so
+//! the answer is that of comparing the rounded distance itself, without a root in the loop.
+
+use super::Topology;
+
+/// The largest x with √x ≤ `radius` in double arithmetic: `d² <= squared_reach(ζ)` is exactly `d²`.sqrt() <= ζ.
+#[must_use]
+pub fn squared_reach(radius: f64) -> f64 {
+    let mut square = radius * radius;
+    if !square.is_finite() {
+        return if radius.is_infinite() { f64::INFINITY } else { f64::MAX };
+    }
+    while square.sqrt() > radius {
+        square = square.next_down();
+    }
+    while square.next_up().sqrt() <= radius {
+        square = square.next_up();
+    }
+    square
+}
+
+/// Squared distance between two points.
+#[inline]
+#[must_use]
+pub fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
+}
+
+/// Squared length of a vector.
+#[inline]
+#[must_use]
+pub fn squared_norm(a: &[f64]) -> f64 {
+    a.iter().map(|x| x * x).sum()
+}
+
+/// Writes the network of the state `z` (N rows of `dim` axes) into `topology`; `reach` holds [`squared_reach`] of each
+/// constrained player.
+pub fn observe(z: &[f64], dim: usize, reach: &[f64], topology: &mut Topology) {
+    topology.clear();
+    let size = topology.size();
+    for (i, &limit) in reach.iter().enumerate() {
+        let zi = &z[i * dim..(i + 1) * dim];
+        for j in 0..size {
+            let d2 = if j == i { squared_norm(zi) } else { squared_distance(zi, &z[j * dim..(j + 1) * dim]) };
+            if d2 <= limit {
+                topology.set(i, j);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::squared_reach;
+
+    #[test]
+    fn squared_reach_is_the_rounded_comparison() {
+        for radius in [0.1, 3f64.sqrt(), 5.0, 2.25, 1e-160, 1e160, 0.3, f64::MIN_POSITIVE] {
+            let reach = squared_reach(radius);
+            assert!(reach.sqrt() <= radius && reach.next_up().sqrt() > radius || reach == f64::MAX, "{radius}");
+        }
+        assert_eq!(squared_reach(f64::INFINITY), f64::INFINITY);
+    }
+}

@@ -1,0 +1,44 @@
+//! The closed loop over one step: ż = C z with the feedback of every player frozen at t_k.
+//!
+//! ż_i = u_i − u_a for each row i (B_d, B_τ and B_a written out), with u_i = g_i z for the constrained players, and
+//! u_a = h_a z, u_a = −r_a⁻¹B_aᵀP_a z = r_a⁻¹(1ᵀP_a) z. In I1 the target's own row is −r_τ⁻¹P_τ[N, :].
+
+use crate::game::{Game, Interaction};
+
+/// The feedback of the players that see everything, as rows on z.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeRows {
+    /// u_a = h_a z.
+    pub attacker: Vec<f64>,
+    /// u_τ = row · z in I1; `None` in I2, where the target is constrained.
+    pub target: Option<Vec<f64>>,
+}
+
+/// The rows of the unconstrained players at an instant with Riccati matrices `p` (all groups, one after another).
+#[must_use]
+pub fn free_rows(game: &Game, p: &[f64]) -> FreeRows {
+    let n = game.size();
+    let w = game.weights();
+    let own = match game.interaction() {
+        Interaction::I1 => &p[2 * n * n..3 * n * n],
+        Interaction::I2 => &p[..n * n],
+    };
+    let attacker = (0..n).map(|j| (0..n).map(|i| own[i * n + j]).sum::<f64>() / w.r_a).collect();
+    let target = (game.interaction() == Interaction::I1)
+        .then(|| p[n * n + (n - 1) * n..2 * n * n].iter().map(|x| -x / w.r_tau).collect());
+    FreeRows { attacker, target }
+}
+
+/// Writes C (N × N, row-major) for the gain rows `gains` (m × N).
+pub fn matrix(free: &FreeRows, gains: &[f64], c: &mut [f64]) {
+    let n = free.attacker.len();
+    c[..gains.len()].copy_from_slice(gains);
+    if let Some(target) = &free.target {
+        c[gains.len()..].copy_from_slice(target);
+    }
+    for row in c.chunks_exact_mut(n) {
+        for (x, a) in row.iter_mut().zip(&free.attacker) {
+            *x -= a;
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The policy: at grid instant t_k and under a topology, what every player does until t_{k+1}.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | C | [`closed_loop::matrix`] | ż = C z with all feedback frozen at t_k |
+//! | exp(Cδ) | [`StepPolicy::transition`] | z(t_{k+1}) = exp(Cδ) z(t_k) |
+//! | h_a ∫exp(Cs)ds | [`StepPolicy::attacker`] | how far the attacker itself moves in the step |
+//!
+//! A [`Policy`] owns the game, its equilibrium and the table of everything computed so far; it is shared, by reference,
+//! between all runs of the game, whatever their positions and radii.
+
+pub mod closed_loop;
+pub mod exponential;
+mod table;
+
+use std::sync::Arc;
+
+pub use table::{DEFAULT_TABLE_BYTES, TableStats};
+
+use crate::cancel::CancelToken;
+use crate::error::EquilibriumError;
+use crate::game::Game;
+use crate::network::Topology;
+use crate::riccati::{self, Equilibrium};
+use crate::synthesis::{Gains, Options, Problem, Synthesizer};
+use table::Table;
+
+/// The answer at one (step, topology).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepPolicy {
+    /// The gains of the constrained players, and how they were found.
+    pub gains: Gains,
+    /// exp(Cδ), N × N row-major.
+    pub transition: Vec<f64>,
+    /// The attacker's displacement over the step is this row times z.
+    pub attacker: Vec<f64>,
+}
+
+impl StepPolicy {
+    fn bytes(&self) -> usize {
+        size_of::<Self>() + size_of::<f64>() * (self.gains.rows.len() + self.transition.len() + self.attacker.len())
+    }
+}
+
+/// A game with its equilibrium and the table of its answers.
+#[derive(Debug)]
+pub struct Policy {
+    game: Game,
+    equilibrium: Equilibrium,
+    table: Table,
+}
+
+impl Policy {
+    /// Solves the Riccati equations of `game` and opens an empty table of at most `table_bytes`.
+    ///
+    /// # Errors
+    /// [`EquilibriumError`] when the game has no equilibrium on [0, T], or the caller cancelled.
+    pub fn new(game: Game, table_bytes: usize, cancel: &CancelToken) -> Result<Self, EquilibriumError> {
+        let equilibrium = riccati::solve(&game, cancel)?;
+        let table = Table::new(game.grid().steps() + 1, table_bytes);
+        Ok(Self { game, equilibrium, table })
+    }
+
+    /// The game.
+    #[must_use]
+    pub fn game(&self) -> &Game {
+        &self.game
+    }
+
+    /// Its equilibrium.
+    #[must_use]
+    pub fn equilibrium(&self) -> &Equilibrium {
+        &self.equilibrium
+    }
+
+    /// What the table has done so far.
+    #[must_use]
+    pub fn table(&self) -> TableStats {
+        self.table.stats()
+    }
+
+    /// The synthesis problem at t_k.
+    #[must_use]
+    pub fn problem(&self, step: usize) -> Problem {
+        Problem::new(&self.game, self.equilibrium.node(step))
+    }
+
+    /// The feedback rows of the players that see everything, at t_k.
+    #[must_use]
+    pub fn free_rows(&self, step: usize) -> closed_loop::FreeRows {
+        closed_loop::free_rows(&self.game, self.equilibrium.node(step))
+    }
+
+    /// The answer at (step, topology), from the table or solved now.
+    #[must_use]
+    pub fn at(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> Arc<StepPolicy> {
+        if let Some(found) = self.table.get(step, topology) {
+            return found;
+        }
+        let entry = Arc::new(self.solve(step, topology, solver));
+        self.table.keep(step, topology, &entry);
+        entry
+    }
+
+    /// Solves (step, topology) without looking at the table.
+    #[must_use]
+    pub fn solve(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> StepPolicy {
+        let n = self.game.size();
+        let gains = solver.solve(&self.problem(step), topology, Options::default());
+        let free = self.free_rows(step);
+        let mut c = vec![0.0; n * n];
+        closed_loop::matrix(&free, &gains.rows, &mut c);
+        let (mut transition, mut attacker) = (vec![0.0; n * n], vec![0.0; n]);
+        exponential::exponential(&c, &free.attacker, self.game.grid().step(), &mut transition, &mut attacker);
+        StepPolicy { gains, transition, attacker }
+    }
+}

@@ -1,0 +1,90 @@
+//! The (step, topology) table: every answer of the policy, computed once and shared by all runs of a game.
+//!
+//! One shelf per grid instant behind its own lock, so that threads at different instants never meet. What is stored is a
+//! function of (step, topology) alone: it does not matter who computes an entry, nor whether it is kept. Past the byte
+//! budget entries are simply not kept.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, PoisonError, RwLock};
+
+use super::StepPolicy;
+use crate::network::Topology;
+
+/// Bytes a table may hold unless told otherwise: 512 MiB, some four million entries at n = 3.
+pub const DEFAULT_TABLE_BYTES: usize = 512 << 20;
+
+/// What a table has done so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct TableStats {
+    /// Entries held.
+    pub entries: usize,
+    /// Lookups that found their entry.
+    pub hits: u64,
+    /// Lookups that had to solve.
+    pub misses: u64,
+    /// Bytes held.
+    pub bytes: usize,
+    /// Bytes the table may hold.
+    pub capacity: usize,
+}
+
+type Shelf = RwLock<HashMap<Topology, Arc<StepPolicy>>>;
+
+/// Answers of the policy by grid instant and topology, within a byte budget.
+#[derive(Debug)]
+pub(super) struct Table {
+    shelves: Vec<Shelf>,
+    capacity: usize,
+    bytes: AtomicUsize,
+    entries: AtomicUsize,
+    hits: AtomicU64,
+    misses: AtomicU64,
+}
+
+impl Table {
+    pub(super) fn new(instants: usize, capacity: usize) -> Self {
+        Self {
+            shelves: (0..instants).map(|_| Shelf::default()).collect(),
+            capacity,
+            bytes: AtomicUsize::new(0),
+            entries: AtomicUsize::new(0),
+            hits: AtomicU64::new(0),
+            misses: AtomicU64::new(0),
+        }
+    }
+
+    /// The entry, if it is held.
+    pub(super) fn get(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
+        let shelf = self.shelves[step].read().unwrap_or_else(PoisonError::into_inner);
+        let found = shelf.get(topology).cloned();
+        let counter = if found.is_some() { &self.hits } else { &self.misses };
+        counter.fetch_add(1, Ordering::Relaxed);
+        found
+    }
+
+    /// Keeps the entry if the budget allows.
+    pub(super) fn keep(&self, step: usize, topology: &Topology, entry: &Arc<StepPolicy>) {
+        let size = entry.bytes() + size_of_val(topology.words()) + size_of::<Topology>();
+        if self.bytes.fetch_add(size, Ordering::Relaxed) + size > self.capacity {
+            self.bytes.fetch_sub(size, Ordering::Relaxed);
+            return;
+        }
+        let mut shelf = self.shelves[step].write().unwrap_or_else(PoisonError::into_inner);
+        if shelf.insert(topology.clone(), Arc::clone(entry)).is_some() {
+            self.bytes.fetch_sub(size, Ordering::Relaxed);
+        } else {
+            self.entries.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn stats(&self) -> TableStats {
+        TableStats {
+            entries: self.entries.load(Ordering::Relaxed),
+            hits: self.hits.load(Ordering::Relaxed),
+            misses: self.misses.load(Ordering::Relaxed),
+            bytes: self.bytes.load(Ordering::Relaxed),
+            capacity: self.capacity,
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! One run of a game: at t_k termination, then the network, then the gains, then one exact step (spec order).
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | z | rows of state relative to the attacker | d₁…d_n, target |
+//! | σ | [`Reach`] | capture radii |
+//! | ζ | [`Setup::visibility`] | visibility radii |
+//!
+//! The sampled-data reading of the paper: feedback and network are frozen between grid instants, the motion is exact.
+
+mod outcome;
+mod record;
+mod setup;
+
+pub use outcome::{Outcome, Reach, distance, relative_state};
+pub(crate) use record::apply;
+pub use record::{Record, simulate};
+pub use setup::Setup;

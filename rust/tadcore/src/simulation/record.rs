@@ -1,0 +1,136 @@
+//! One game, everything recorded.
+
+use super::outcome::{Outcome, Reach, relative_state};
+use super::setup::Setup;
+use crate::cancel::CancelToken;
+use crate::error::RunError;
+use crate::network::{Topology, observe, squared_reach};
+use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
+use crate::synthesis::{Status, Synthesizer};
+
+/// A recorded run of L steps: L + 1 rows, the last the terminal state.
+///
+/// No step follows the terminal state; its row carries the last network in force and the feedback under it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// L.
+    pub steps: usize,
+    /// Axes.
+    pub dim: usize,
+    /// (L + 1) × (n + 2) × dim.
+    pub positions: Vec<f64>,
+    /// Velocities, (L + 1) × (n + 2) × dim.
+    pub controls: Vec<f64>,
+    /// The network at each row.
+    pub networks: Vec<Topology>,
+    /// Gain rows, (L + 1) × m × N.
+    pub gains: Vec<f64>,
+    /// Θ at each row, reduced.
+    pub theta: Vec<f64>,
+    /// Terms of Θ, unweighted and reduced, (L + 1) × 4 or 3.
+    pub terms: Vec<f64>,
+    /// Iterations of all syntheses that the run needed, whether or not the table held them.
+    pub iterations: usize,
+    /// Rows whose synthesis did not reach its tolerance.
+    pub unconverged: usize,
+    /// Rows whose gains are proved to be globally optimal.
+    pub certified: usize,
+}
+
+/// Runs one game and records everything.
+///
+/// # Errors
+/// [`RunError`] for positions or radii that break a rule, or when the caller cancelled.
+pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
+    setup.check(policy.game())?;
+    let game = policy.game();
+    let (n, size, m, dim) = (game.n(), game.size(), game.constrained(), setup.dim);
+    let reach = Reach::new(setup.capture);
+    let sight: Vec<f64> = setup.visibility.iter().map(|&zeta| squared_reach(zeta)).collect();
+    let mut z = Vec::with_capacity(size * dim);
+    relative_state(setup.positions, dim, &mut z);
+    let mut attacker = setup.positions[(n + 1) * dim..].to_vec();
+    let mut topology = Topology::empty(m, size);
+    let mut solver = Synthesizer::new();
+    let mut record = Record {
+        outcome: Outcome::Timeout,
+        steps: 0,
+        dim,
+        positions: Vec::new(),
+        controls: Vec::new(),
+        networks: Vec::new(),
+        gains: Vec::new(),
+        theta: Vec::new(),
+        terms: Vec::new(),
+        iterations: 0,
+        unconverged: 0,
+        certified: 0,
+    };
+    let last = game.grid().steps();
+    let mut next = vec![0.0; size * dim];
+    for k in 0..=last {
+        cancel.check()?;
+        let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
+        if end.is_none() || k == 0 {
+            observe(&z, dim, &sight, &mut topology);
+        }
+        let step = policy.at(k, &topology, &mut solver);
+        record.push(policy, k, &z, &attacker, &topology, &step);
+        if let Some(outcome) = end {
+            record.outcome = outcome;
+            record.steps = k;
+            break;
+        }
+        advance(&step, &z, dim, &mut next, &mut attacker);
+        std::mem::swap(&mut z, &mut next);
+    }
+    Ok(record)
+}
+
+/// z ← exp(Cδ) z, and the attacker by its own row.
+fn advance(step: &StepPolicy, z: &[f64], dim: usize, next: &mut [f64], attacker: &mut [f64]) {
+    let size = step.attacker.len();
+    for (row, out) in step.transition.chunks_exact(size).zip(next.chunks_exact_mut(dim)) {
+        apply(row, z, dim, out);
+    }
+    let mut moved = vec![0.0; dim];
+    apply(&step.attacker, z, dim, &mut moved);
+    attacker.iter_mut().zip(moved).for_each(|(x, d)| *x += d);
+}
+
+/// out = row · z.
+pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
+    out.fill(0.0);
+    for (g, zj) in row.iter().zip(z.chunks_exact(dim)) {
+        for (o, x) in out.iter_mut().zip(zj) {
+            *o += g * x;
+        }
+    }
+}
+
+impl Record {
+    fn push(&mut self, policy: &Policy, k: usize, z: &[f64], attacker: &[f64], network: &Topology, step: &StepPolicy) {
+        let dim = self.dim;
+        for row in z.chunks_exact(dim) {
+            self.positions.extend(row.iter().zip(attacker).map(|(x, a)| x + a));
+        }
+        self.positions.extend_from_slice(attacker);
+        let FreeRows { attacker: h, target } = policy.free_rows(k);
+        let mut velocity = vec![0.0; dim];
+        let gains = step.gains.rows.chunks_exact(network.size());
+        for row in gains.chain(target.as_deref()).chain(std::iter::once(&h[..])) {
+            apply(row, z, dim, &mut velocity);
+            self.controls.extend_from_slice(&velocity);
+        }
+        let problem = policy.problem(k);
+        self.terms.extend(problem.terms(policy.equilibrium().node(k), &step.gains.rows));
+        self.networks.push(network.clone());
+        self.gains.extend_from_slice(&step.gains.rows);
+        self.theta.push(step.gains.theta);
+        self.iterations += step.gains.iterations;
+        self.unconverged += usize::from(step.gains.status != Status::Converged);
+        self.certified += usize::from(step.gains.certified);
+    }
+}

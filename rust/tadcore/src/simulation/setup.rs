@@ -1,0 +1,53 @@
+//! What one run adds to a game: positions and radii, checked before anything runs.
+
+use crate::error::GameError;
+use crate::game::Game;
+use crate::game::validation::{positive, rule};
+
+/// Positions and radii of one run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup<'a> {
+    /// Axes, 2 or 3 (any positive number works).
+    pub dim: usize,
+    /// Positions, (n + 2) × dim: d₁…d_n, target, attacker.
+    pub positions: &'a [f64],
+    /// ζ of the constrained players (m); may be infinite.
+    pub visibility: &'a [f64],
+    /// σ_{d_1}…σ_{d_n}, σ_a.
+    pub capture: &'a [f64],
+}
+
+impl Setup<'_> {
+    /// Checks every number against its rule.
+    ///
+    /// # Errors
+    /// [`GameError`] naming the first that breaks it.
+    pub fn check(&self, game: &Game) -> Result<(), GameError> {
+        let n = game.n();
+        rule("dim", self.dim as f64, self.dim >= 1, "at least one axis")?;
+        let lengths: [(&'static str, usize, usize); 3] = [
+            ("positions", self.positions.len(), (n + 2) * self.dim),
+            ("visibility_radii", self.visibility.len(), game.constrained()),
+            ("capture_radii", self.capture.len(), n + 1),
+        ];
+        for (field, found, expected) in lengths {
+            if found != expected {
+                return Err(GameError::Length { field, found, expected });
+            }
+        }
+        for (e, &x) in self.positions.iter().enumerate() {
+            rule(&format!("positions[{}, {}]", e / self.dim, e % self.dim), x, x.is_finite(), "a finite number")?;
+        }
+        for (i, &zeta) in self.visibility.iter().enumerate() {
+            rule(&format!("visibility_radii[{i}]"), zeta, zeta > 0.0, "a positive number or infinity")?;
+        }
+        for (i, &sigma) in self.capture.iter().enumerate() {
+            positive(&format!("capture_radii[{i}]"), sigma)?;
+            if i < n {
+                let below = sigma < self.visibility[i];
+                rule(&format!("capture_radii[{i}]"), sigma, below, "smaller than the visibility radius")?;
+            }
+        }
+        Ok(())
+    }
+}

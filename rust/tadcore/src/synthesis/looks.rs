@@ -1,0 +1,179 @@
+//! From the canonical start to the global minimum: which descents are made, and when no more are needed.
+//!
+//! 1. Newton from the canonical start. Most entries end here: the certificate of [`super::objective`] proves the
+//!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
+//! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a small
+//!    fixed second part B. Each descends without long jumps between basins and comes back to the real gains A, A + B
+//!    and A − B, from where Newton finishes.
+//! 3. A last look from the best point with one row reversed at a time: GᵀRG does not see the sign of a row.
+//!
+//! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
+//! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
+
+use super::complex::ComplexGains;
+use super::newton::{Limits, Objective, Reached, Workspace, minimise};
+use super::objective::{RealGains, norm};
+use super::problem::Problem;
+use super::start::{self, Variable};
+
+/// The look that won.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Newton from the canonical start.
+    Canonical,
+    /// The second look, in complex gains.
+    Complex,
+    /// The third look, in stacked gains.
+    Stacked,
+    /// The last look, with a row reversed.
+    Reversed,
+}
+
+/// Size of the second part B at the start, relative to ‖F‖.
+const SECOND_PART: f64 = 0.1;
+/// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
+const LONGEST_STEP: f64 = 0.3;
+/// Relative gradient at which a second or third look has found its basin.
+const BASIN: f64 = 1e-6;
+/// Steps of a second or third look.
+const LOOK_ITERATIONS: usize = 300;
+/// How much lower, relatively, a look must be to win.
+const TIE: f64 = 1e-9;
+/// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
+const CERTIFICATE_ROUNDING: f64 = 1e-12;
+
+/// Scratch reused from solve to solve.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    pub(super) newton: Workspace,
+    doubled: Vec<Variable>,
+    pair: Vec<f64>,
+    shift: Vec<f64>,
+    trial: Vec<f64>,
+    form: Vec<f64>,
+    restricted: Vec<f64>,
+}
+
+/// The best point of all looks.
+pub(super) struct Best {
+    pub reached: Reached,
+    pub look: Look,
+    pub certified: bool,
+    pub iterations: usize,
+}
+
+/// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
+#[inline(always)]
+pub(super) fn search<const N: usize, const M: usize>(
+    problem: &Problem,
+    variables: &[Variable],
+    g: &mut [f64],
+    limits: Limits,
+    s: &mut Scratch,
+) -> Best {
+    let start = g.to_vec();
+    let mut real = RealGains::<N, M>::new(problem, 1);
+    let reached = minimise(&mut real, g, variables, limits, &mut s.newton);
+    let certified = certify(&mut real, g, variables, s);
+    let mut best = Best { reached, look: Look::Canonical, certified, iterations: reached.iterations };
+    if certified {
+        return best;
+    }
+    let scales = (real.gradient_scale(&start), real.value_scale());
+    let mut complex = ComplexGains::<N, M>::new(problem, scales);
+    look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
+    let mut stacked = RealGains::<N, M>::new(problem, 2);
+    look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
+    let (n, from) = (problem.size, g.to_vec());
+    for i in 0..problem.rows {
+        let row = i * n..(i + 1) * n;
+        if from[row.clone()].iter().all(|&x| x == 0.0) {
+            continue;
+        }
+        s.trial.clear();
+        s.trial.extend_from_slice(&from);
+        s.trial[row].iter_mut().for_each(|x| *x = -*x);
+        finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+    }
+    if best.look != Look::Canonical {
+        best.certified = certify(&mut real, g, variables, s);
+    }
+    best
+}
+
+/// Descends in a doubled problem from the canonical start and comes back to the real one.
+#[inline(always)]
+fn look<const N: usize, const M: usize, O: Objective>(
+    doubled: &mut O,
+    name: Look,
+    problem: &Problem,
+    real: &mut RealGains<N, M>,
+    variables: &[Variable],
+    start: &[f64],
+    g: &mut [f64],
+    best: &mut Best,
+    limits: Limits,
+    s: &mut Scratch,
+) {
+    let (width, scale) = (start.len(), norm(&problem.fne));
+    s.doubled.clear();
+    s.doubled.extend_from_slice(variables);
+    s.doubled.extend(variables.iter().map(|v| Variable { entry: v.entry + width, own: v.own + width, ..*v }));
+    let size = SECOND_PART * scale / (variables.len() as f64).sqrt();
+    s.shift.clear();
+    // A fixed pattern without symmetry; the golden angle spreads it.
+    s.shift.extend((0..variables.len()).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()));
+    s.pair.clear();
+    s.pair.extend_from_slice(start);
+    s.pair.resize(2 * width, 0.0);
+    start::advance(&mut s.pair[width..], variables, &s.shift);
+    let short = Limits {
+        iterations: LOOK_ITERATIONS,
+        tolerance: BASIN,
+        acceptable: BASIN,
+        longest: LONGEST_STEP * scale,
+    };
+    best.iterations += minimise(doubled, &mut s.pair, &s.doubled, short, &mut s.newton).iterations;
+    for sign in [0.0, 1.0, -1.0] {
+        let (a, b) = s.pair.split_at(width);
+        s.trial.clear();
+        s.trial.extend(a.iter().zip(b).map(|(a, b)| a + sign * b));
+        finish(name, real, variables, g, best, limits, s);
+    }
+}
+
+/// Newton from `s.trial`; keeps the point in `g` when it is lower.
+#[inline(always)]
+fn finish<const N: usize, const M: usize>(
+    name: Look,
+    real: &mut RealGains<N, M>,
+    variables: &[Variable],
+    g: &mut [f64],
+    best: &mut Best,
+    limits: Limits,
+    s: &mut Scratch,
+) {
+    let reached = minimise(real, &mut s.trial, variables, limits, &mut s.newton);
+    best.iterations += reached.iterations;
+    if reached.value < best.reached.value - TIE * best.reached.value.abs() {
+        g.copy_from_slice(&s.trial);
+        best.reached = reached;
+        best.look = name;
+    }
+}
+
+/// Whether the certificate proves the critical point `g` to be a global minimiser.
+#[inline(always)]
+pub(super) fn certify<const N: usize, const M: usize>(real: &mut RealGains<N, M>, g: &[f64], variables: &[Variable], s: &mut Scratch) -> bool {
+    let (d, width) = (variables.len(), real.width());
+    real.value(g);
+    s.form.resize(width * width, 0.0);
+    s.restricted.resize(d * d, 0.0);
+    real.certificate_form(&mut s.form);
+    start::restrict_form(&s.form, width, variables, &mut s.restricted, d);
+    let largest = (0..d).fold(0.0, |m: f64, i| m.max(s.restricted[i * d + i].abs()));
+    for i in 0..d {
+        s.restricted[i * d + i] += CERTIFICATE_ROUNDING * largest;
+    }
+    largest == 0.0 || super::dense::factorise(&mut s.restricted[..d * d], d)
+}

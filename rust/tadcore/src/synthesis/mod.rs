@@ -1,0 +1,288 @@
+//! Synthesis: the gains of the constrained players at one instant, min Θ₁ (I1) or min Θ₂ (I2) over what each may use.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | G | [`Gains::rows`] | stacked rows g_i, u_i = g_i z: the reduced factors of K_i 𝓘_i |
+//! | K_i | [`Gains::paper_gains`] | the paper's gain blocks, reduced: K_i 𝓘_i = g_i |
+//! | Θ | [`Gains::theta`] | Θ₁ (eq:errfun1) or Θ₂ (eq:errfun2), in reduced norms: a block norm is `dim` times as large |
+//! | γ | weights of Θ's terms | |
+//!
+//! Θ is non-convex. The answer is the global minimiser as far as [`looks`] can find it, and `certified` says when it is
+//! proved to be. It is a function of the instant and the topology alone: never of the state, of a previous gain or of
+//! the way the game got there, so that it can be tabulated and shared.
+//!
+//! Sizes N ≤ 8 are compiled with constant loop bounds (measured at n = 3: 2.6 times as fast as with bounds known at run
+//! time); larger ones share one version whose factorisations go to faer.
+
+mod complex;
+mod dense;
+mod descent;
+pub mod looks;
+mod newton;
+mod objective;
+mod problem;
+mod start;
+
+pub use looks::Look;
+pub use newton::Status;
+pub use problem::Problem;
+
+use crate::network::Topology;
+use newton::Limits;
+use objective::RealGains;
+use start::Variable;
+
+/// How the gains are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Exact-Hessian Newton with the further looks: the method the policy uses.
+    #[default]
+    Newton,
+    /// The paper's gradient descent from the canonical start, without further looks.
+    Descent,
+}
+
+/// How to solve, and when to stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// The method.
+    pub method: Method,
+    /// Iterations of one descent.
+    pub max_iterations: usize,
+}
+
+impl Options {
+    /// The options of a method: 200 iterations for Newton, 100,000 for descent.
+    #[must_use]
+    pub fn new(method: Method) -> Self {
+        let max_iterations = match method {
+            Method::Newton => 200,
+            Method::Descent => 100_000,
+        };
+        Self { method, max_iterations }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self::new(Method::Newton)
+    }
+}
+
+/// Relative gradient norm aimed at, and the one that counts as converged when rounding stops the progress.
+const TOLERANCE: (f64, f64) = (1e-12, 1e-10);
+
+/// The gains at one (instant, topology).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains {
+    /// g_i, m × N; zero on players that i does not see.
+    pub rows: Vec<f64>,
+    /// Θ, reduced.
+    pub theta: f64,
+    /// Norm of the gradient with respect to the variables, relative to the parts that cancel in it.
+    pub gradient_norm: f64,
+    /// Iterations of all descents together.
+    pub iterations: usize,
+    /// How the descent that won ended.
+    pub status: Status,
+    /// Whether the minimum is proved to be global.
+    pub certified: bool,
+    /// The look that won.
+    pub look: Look,
+}
+
+impl Gains {
+    /// The paper's K_i, reduced (m × N): entry j ≠ i on z_j − z_i, entry i on z_i; zero on players not seen.
+    #[must_use]
+    pub fn paper_gains(&self, topology: &Topology) -> Vec<f64> {
+        let n = topology.size();
+        let mut k = self.rows.clone();
+        for i in 0..topology.rows() {
+            let row = &self.rows[i * n..(i + 1) * n];
+            k[i * n + i] = if topology.sees_attacker(i) { row.iter().sum() } else { 0.0 };
+        }
+        k
+    }
+}
+
+/// A solver with its scratch memory; one per thread.
+#[derive(Debug, Default)]
+pub struct Synthesizer {
+    variables: Vec<Variable>,
+    scratch: looks::Scratch,
+}
+
+impl Synthesizer {
+    /// A solver that has allocated nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The gains for `topology` at the instant of `problem`.
+    pub fn solve(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Gains {
+        match (problem.size, problem.rows) {
+            (2, 1) => self.solve_sized::<2, 1>(problem, topology, options),
+            (2, 2) => self.solve_sized::<2, 2>(problem, topology, options),
+            (3, 2) => self.solve_sized::<3, 2>(problem, topology, options),
+            (3, 3) => self.solve_sized::<3, 3>(problem, topology, options),
+            (4, 3) => self.solve_sized::<4, 3>(problem, topology, options),
+            (4, 4) => self.solve_sized::<4, 4>(problem, topology, options),
+            (5, 4) => self.solve_sized::<5, 4>(problem, topology, options),
+            (5, 5) => self.solve_sized::<5, 5>(problem, topology, options),
+            (6, 5) => self.solve_sized::<6, 5>(problem, topology, options),
+            (6, 6) => self.solve_sized::<6, 6>(problem, topology, options),
+            (7, 6) => self.solve_sized::<7, 6>(problem, topology, options),
+            (7, 7) => self.solve_sized::<7, 7>(problem, topology, options),
+            (8, 7) => self.solve_sized::<8, 7>(problem, topology, options),
+            (8, 8) => self.solve_sized::<8, 8>(problem, topology, options),
+            _ => self.solve_sized::<0, 0>(problem, topology, options),
+        }
+    }
+
+    fn solve_sized<const N: usize, const M: usize>(
+        &mut self,
+        problem: &Problem,
+        topology: &Topology,
+        options: Options,
+    ) -> Gains {
+        let mut rows = vec![0.0; problem.rows * problem.size];
+        start::canonical(problem, topology, &mut rows);
+        start::variables(topology, &mut self.variables);
+        let limits = Limits {
+            iterations: options.max_iterations,
+            tolerance: TOLERANCE.0,
+            acceptable: TOLERANCE.1,
+            longest: f64::INFINITY,
+        };
+        let (reached, look, certified, iterations) = match options.method {
+            Method::Newton => {
+                let best = looks::search::<N, M>(problem, &self.variables, &mut rows, limits, &mut self.scratch);
+                (best.reached, best.look, best.certified, best.iterations)
+            }
+            Method::Descent => {
+                start::paper_variables(topology, &mut self.variables);
+                let mut real = RealGains::<N, M>::new(problem, 1);
+                let reached = descent::descend(&mut real, &mut rows, &self.variables, limits);
+                let certified = looks::certify(&mut real, &rows, &self.variables, &mut self.scratch);
+                (reached, Look::Canonical, certified, reached.iterations)
+            }
+        };
+        Gains {
+            rows,
+            theta: reached.value,
+            gradient_norm: reached.gradient_norm,
+            iterations,
+            status: reached.status,
+            certified: certified && reached.status == Status::Converged,
+            look,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::complex::ComplexGains;
+    use super::newton::Objective;
+    use super::objective::RealGains;
+    use super::*;
+    use crate::game::Interaction;
+
+    fn check(objective: &mut impl Objective, g: &[f64]) {
+        let width = objective.width();
+        let h = 1e-5;
+        let (mut gradient, mut hessian) = (vec![0.0; width], vec![0.0; width * width]);
+        objective.value(g);
+        objective.gradient(g, &mut gradient);
+        objective.hessian(g, &mut hessian);
+        for a in 0..width {
+            let mut probe = |shift: f64| {
+                let mut p = g.to_vec();
+                p[a] += shift;
+                let mut slope = vec![0.0; width];
+                let value = objective.value(&p);
+                objective.gradient(&p, &mut slope);
+                (value, slope)
+            };
+            let ((above, up), (below, down)) = (probe(h), probe(-h));
+            let slope = (above - below) / (2.0 * h);
+            assert!((slope - gradient[a]).abs() < 1e-6 * (1.0 + slope.abs()), "gradient {a}");
+            for b in 0..=a {
+                let curve = (up[b] - down[b]) / (2.0 * h);
+                assert!((curve - hessian[a * width + b]).abs() < 1e-5 * (1.0 + curve.abs()), "hessian {a} {b}");
+            }
+        }
+    }
+
+    fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {
+        let (size, groups) = if interaction == Interaction::I1 { (4, 3) } else { (3, 1) };
+        let mut seed = 0.3f64;
+        let mut next = || {
+            seed = (seed * 37.77 + 0.123).fract();
+            seed - 0.5
+        };
+        let mut p = vec![0.0; groups * size * size];
+        for matrix in p.chunks_exact_mut(size * size) {
+            for a in 0..size {
+                for b in 0..=a {
+                    matrix[a * size + b] = 2.0 * next();
+                    matrix[b * size + a] = matrix[a * size + b];
+                }
+            }
+        }
+        let gamma = [0.4, 0.3, 0.2, 0.6][..interaction.terms()].to_vec();
+        let problem = Problem::from_parts(interaction, vec![0.7, 1.3, 0.9], gamma, &p);
+        let g = (0..2 * 3 * size).map(|_| next()).collect();
+        (problem, p, g)
+    }
+
+    #[test]
+    fn derivatives_match_differences() {
+        for interaction in [Interaction::I1, Interaction::I2] {
+            let (problem, _, g) = sample(interaction);
+            check(&mut RealGains::<0, 0>::new(&problem, 1), &g[..g.len() / 2]);
+            check(&mut RealGains::<0, 0>::new(&problem, 2), &g);
+            check(&mut ComplexGains::<0, 0>::new(&problem, (1.0, 1.0)), &g);
+        }
+    }
+
+    #[test]
+    fn the_value_is_the_weighted_sum_of_the_terms() {
+        for interaction in [Interaction::I1, Interaction::I2] {
+            let (problem, p, g) = sample(interaction);
+            let g = &g[..g.len() / 2];
+            let value = RealGains::<0, 0>::new(&problem, 1).value(g);
+            let sum = problem.weigh(&problem.terms(&p, g));
+            assert!((sum - value).abs() < 1e-12 * value);
+        }
+    }
+
+    #[test]
+    fn who_sees_no_one_has_no_gain_and_who_sees_all_plays_the_equilibrium() {
+        for interaction in [Interaction::I1, Interaction::I2] {
+            let (problem, _, _) = sample(interaction);
+            let (m, n) = (problem.rows(), problem.size());
+            let mut solver = Synthesizer::new();
+            let blind = solver.solve(&problem, &Topology::empty(m, n), Options::default());
+            assert!(blind.rows.iter().all(|&g| g == 0.0) && blind.certified);
+            let full = solver.solve(&problem, &Topology::complete(m, n), Options::default());
+            assert!(full.theta < 1e-24 && full.certified);
+            for (g, f) in full.rows.iter().zip(problem.fne()) {
+                assert!((g - f).abs() < 1e-12);
+            }
+        }
+    }
+}
+
+#[doc(hidden)]
+impl Synthesizer {
+    pub fn unknowns(&mut self, t: &Topology) -> usize { start::variables(t, &mut self.variables); self.variables.len() }
+    pub fn from(&mut self, p: &Problem, t: &Topology, x: &[f64]) -> Gains {
+        start::variables(t, &mut self.variables);
+        let mut g = vec![0.0; p.rows * p.size];
+        start::advance(&mut g, &self.variables, x);
+        let mut o = RealGains::<0, 0>::new(p, 1);
+        let r = newton::minimise(&mut o, &mut g, &self.variables, Limits { iterations: 1000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY }, &mut self.scratch.newton);
+        Gains { rows: g, theta: r.value, gradient_norm: r.gradient_norm, iterations: r.iterations, status: r.status, certified: false, look: Look::Canonical }
+    }
+}

@@ -1,0 +1,152 @@
+//! The data of one instant: what Θ compares the gains with.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | F | `fne` | FNE rows: −R_d⁻¹B_dᵀP_d (I1), R⁻¹P (I2); m × N |
+//! | M = FᵀRF | `target` | P_dS_dP_d (I1), PS_dP + PS_τP (I2); N × N |
+//! | W_p | `coupling` | √γ · P_pB_d for p = τ, a, stored by columns: row i is √γ P_p[i, :]; I1 only |
+//! | R | `r` | control weights of the constrained players |
+//!
+//! With Δ = G − F every residual of the paper reads (reduced; a block norm is `dim` times as large):
+//! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
+//! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
+
+use crate::game::{Game, Interaction};
+
+/// Everything Θ needs to know of one instant t_k.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    pub(super) interaction: Interaction,
+    pub(super) size: usize,
+    pub(super) rows: usize,
+    pub(super) gamma: Vec<f64>,
+    pub(super) r: Vec<f64>,
+    pub(super) fne: Vec<f64>,
+    pub(super) target: Vec<f64>,
+    pub(super) coupling: Vec<Vec<f64>>,
+    /// Σ_p W_pᵀW_p, m × m.
+    pub(super) coupling_gram: Vec<f64>,
+    /// c_i.
+    pub(super) closeness: Vec<f64>,
+}
+
+impl Problem {
+    /// The problem of `game` at an instant whose Riccati matrices are `p` (all groups, N × N each, one after another).
+    #[must_use]
+    pub fn new(game: &Game, p: &[f64]) -> Self {
+        let (r, gamma) = (game.constrained_control_weights(), game.weights().gamma.clone());
+        Self::from_parts(game.interaction(), r, gamma, p)
+    }
+
+    /// The same from its parts: control weights of the constrained players, γ and the Riccati matrices.
+    ///
+    /// # Panics
+    /// When `p` does not hold the interaction's matrices (a programming error).
+    #[must_use]
+    pub fn from_parts(interaction: Interaction, r: Vec<f64>, gamma: Vec<f64>, p: &[f64]) -> Self {
+        let rows = r.len();
+        let size = if interaction == Interaction::I1 { rows + 1 } else { rows };
+        let groups = if interaction == Interaction::I1 { 3 } else { 1 };
+        assert_eq!(p.len(), groups * size * size, "Riccati matrices of the wrong size");
+        let own = &p[..size * size];
+        let sign = if interaction == Interaction::I1 { -1.0 } else { 1.0 };
+        let fne: Vec<f64> = (0..rows * size).map(|e| sign * own[e] / r[e / size]).collect();
+        let mut target = vec![0.0; size * size];
+        for i in 0..rows {
+            let f = &fne[i * size..(i + 1) * size];
+            for a in 0..size {
+                for b in 0..size {
+                    target[a * size + b] += r[i] * f[a] * f[b];
+                }
+            }
+        }
+        let coupling: Vec<Vec<f64>> = (1..groups)
+            .filter(|&p| gamma[p] > 0.0)
+            .map(|group| {
+                let matrix = &p[group * size * size..(group + 1) * size * size];
+                let scale = gamma[group].sqrt();
+                (0..rows * size).map(|e| scale * matrix[e]).collect()
+            })
+            .collect();
+        let mut coupling_gram = vec![0.0; rows * rows];
+        for w in &coupling {
+            for i in 0..rows {
+                for j in 0..rows {
+                    coupling_gram[i * rows + j] +=
+                        (0..size).map(|a| w[i * size + a] * w[j * size + a]).sum::<f64>();
+                }
+            }
+        }
+        let closeness = (0..rows)
+            .map(|i| {
+                let term = match interaction {
+                    Interaction::I1 => 3,
+                    Interaction::I2 => 1 + usize::from(i + 1 == rows),
+                };
+                gamma[term] * r[i] * r[i]
+            })
+            .collect();
+        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness }
+    }
+
+    /// N.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// m, the constrained players.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The FNE rows F, m × N.
+    #[must_use]
+    pub fn fne(&self) -> &[f64] {
+        &self.fne
+    }
+
+    /// The squared residual norms of the gain rows `g`, unweighted and reduced, in the order of γ:
+    /// ‖ΔQ_d‖², ‖ΔQ_τ‖², ‖ΔQ_a‖², ‖S₁‖² in I1 (`p`: the Riccati matrices of the instant) and ‖ΔQ‖², ‖S₂‖², ‖S₃‖² in I2.
+    #[must_use]
+    pub fn terms(&self, p: &[f64], g: &[f64]) -> Vec<f64> {
+        let (n, m) = (self.size, self.rows);
+        let delta: Vec<f64> = g.iter().zip(&self.fne).map(|(g, f)| g - f).collect();
+        let closeness = |rows: std::ops::Range<usize>| -> f64 {
+            rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (self.r[i] * d).powi(2))).sum()
+        };
+        let mut quadratic = 0.0;
+        for a in 0..n {
+            for b in 0..n {
+                let gain: f64 = (0..m).map(|i| self.r[i] * g[i * n + a] * g[i * n + b]).sum();
+                quadratic += (gain - self.target[a * n + b]).powi(2);
+            }
+        }
+        match self.interaction {
+            Interaction::I2 => vec![quadratic, closeness(0..m - 1), closeness(m - 1..m)],
+            Interaction::I1 => {
+                let coupled = |group: usize| -> f64 {
+                    let matrix = &p[group * n * n..(group + 1) * n * n];
+                    let product = |a: usize, b: usize| -> f64 {
+                        (0..m).map(|i| matrix[i * n + a] * delta[i * n + b]).sum()
+                    };
+                    let mut sum = 0.0;
+                    for a in 0..n {
+                        for b in 0..n {
+                            sum += (product(a, b) + product(b, a)).powi(2);
+                        }
+                    }
+                    sum
+                };
+                vec![quadratic, coupled(1), coupled(2), closeness(0..m)]
+            }
+        }
+    }
+
+    /// Θ = γ · terms.
+    #[must_use]
+    pub fn weigh(&self, terms: &[f64]) -> f64 {
+        self.gamma.iter().zip(terms).map(|(g, t)| g * t).sum()
+    }
+}

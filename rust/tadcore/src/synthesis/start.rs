@@ -1,0 +1,106 @@
+//! The canonical start and the variables: what a topology leaves free.
+//!
+//! Row i of the gains lies in the row space of 𝓘_i: entries on the players it sees and on itself; when it does not see
+//! the attacker these sum to zero, because it then knows only differences z_j − z_i. A player that sees no one has no
+//! variable at all. A variable is a direction e_j, or e_j − e_i in a row that does not see the attacker.
+//!
+//! The canonical start is the orthogonal projection of the FNE rows on these spaces: the minimiser of the ‖S‖² terms
+//! alone. It depends on (t_k, topology) and on nothing else.
+
+use super::problem::Problem;
+use crate::network::Topology;
+
+/// One variable: the direction e_j, less e_i in a row that does not see the attacker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Variable {
+    /// Position of (i, j) in the m × N gains.
+    pub entry: usize,
+    /// Position of (i, i), subtracted when `relative`.
+    pub own: usize,
+    /// Whether row i knows differences only.
+    pub relative: bool,
+}
+
+/// Writes the variables of `topology` into `out`, row by row.
+pub(super) fn variables(topology: &Topology, out: &mut Vec<Variable>) {
+    out.clear();
+    let n = topology.size();
+    for i in 0..topology.rows() {
+        let own = i * n + i;
+        let relative = !topology.sees_attacker(i);
+        for j in (0..n).filter(|&j| j == i || topology.sees(i, j)) {
+            if j != i || !relative {
+                out.push(Variable { entry: i * n + j, own, relative });
+            }
+        }
+    }
+}
+
+/// The paper's own variables, the entries of K_i: e_j − e_i for each player seen, e_i when the attacker is seen.
+pub(super) fn paper_variables(topology: &Topology, out: &mut Vec<Variable>) {
+    out.clear();
+    let n = topology.size();
+    for i in 0..topology.rows() {
+        for j in (0..n).filter(|&j| topology.sees(i, j)) {
+            out.push(Variable { entry: i * n + j, own: i * n + i, relative: j != i });
+        }
+    }
+}
+
+/// Writes the canonical start into `g` (m × N).
+pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
+    let n = problem.size;
+    for i in 0..problem.rows {
+        let relative = !topology.sees_attacker(i);
+        let used = |j: usize| j == i || topology.sees(i, j);
+        let row = &problem.fne[i * n..(i + 1) * n];
+        let (mut sum, mut count) = (0.0, 0.0);
+        for j in (0..n).filter(|&j| used(j)) {
+            sum += row[j];
+            count += 1.0;
+        }
+        let mean = if relative { sum / count } else { 0.0 };
+        for j in 0..n {
+            g[i * n + j] = if used(j) { row[j] - mean } else { 0.0 };
+        }
+        if relative && count == 1.0 {
+            g[i * n + i] = 0.0;
+        }
+    }
+}
+
+/// Adds Σ x_v · direction_v to the gains.
+pub(super) fn advance(g: &mut [f64], variables: &[Variable], x: &[f64]) {
+    for (v, &x) in variables.iter().zip(x) {
+        g[v.entry] += x;
+        if v.relative {
+            g[v.own] -= x;
+        }
+    }
+}
+
+/// Restricts a gradient with respect to the m × N gains to the variables.
+pub(super) fn restrict(full: &[f64], variables: &[Variable], out: &mut [f64]) {
+    for (v, x) in variables.iter().zip(out) {
+        *x = full[v.entry] - if v.relative { full[v.own] } else { 0.0 };
+    }
+}
+
+/// Restricts a quadratic form on the m × N gains (`width` = mN, row-major) to the variables; lower triangle of `out`.
+pub(super) fn restrict_form(full: &[f64], width: usize, variables: &[Variable], out: &mut [f64], stride: usize) {
+    for (a, va) in variables.iter().enumerate() {
+        for (b, vb) in variables[..=a].iter().enumerate() {
+            let mut x = full[va.entry * width + vb.entry];
+            if va.relative {
+                x -= full[va.own * width + vb.entry];
+            }
+            if vb.relative {
+                x -= full[va.entry * width + vb.own];
+                if va.relative {
+                    x += full[va.own * width + vb.own];
+                }
+            }
+            out[a * stride + b] = x;
+        }
+    }
+}
