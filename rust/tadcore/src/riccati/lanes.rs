@@ -114,25 +114,23 @@ widened! {
 }
 
 widened! {
-    /// Σ e5², Σ e3² and Σ y² at the new point over the entries from `start` of one block.
+    /// Σ (w e5)² and Σ (w e3)² over the block of entries from `start`.
     #[inline(never)]
-    pub(super) fn error_sums(y_new: &[f64], k: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
-        let len = y_new.len();
-        let (k5, k3) = (stages(k, len, &t::E5), stages(k, len, &t::E3));
-        let k5 = k5.map(|k| &k[start..start + block]);
-        let k3 = k3.map(|k| &k[start..start + block]);
-        let y = &y_new[start..start + block];
-        let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    pub(super) fn error_sums(k: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64) {
+        let len = weight.len();
+        let k5 = stages(k, len, &t::E5).map(|k| &k[start..][..block]);
+        let k3 = stages(k, len, &t::E3).map(|k| &k[start..][..block]);
+        let weight = &weight[start..][..block];
+        let (mut five, mut three) = ([0.0; LANES], [0.0; LANES]);
         for c in 0..block / LANES {
             for i in 0..LANES {
                 let at = c * LANES + i;
-                let (e5, e3) = (sum(&k5, &t::E5, at), sum(&k3, &t::E3, at));
+                let (e5, e3) = (weight[at] * sum(&k5, &t::E5, at), weight[at] * sum(&k3, &t::E3, at));
                 five[i] += e5 * e5;
                 three[i] += e3 * e3;
-                size[i] += y[at] * y[at];
             }
         }
-        (five.iter().sum(), three.iter().sum(), size.iter().sum())
+        (five.iter().sum(), three.iter().sum())
     }
 }
 

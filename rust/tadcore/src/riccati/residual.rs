@@ -111,6 +111,9 @@ impl Flow for Textbook {
     fn block_len(&self) -> usize {
         self.block
     }
+    fn shape(&self) -> (usize, usize) {
+        (self.n, self.n)
+    }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
         let len = self.n * self.n;
         let p: Vec<&[f64]> = y.chunks_exact(self.block).map(|b| &b[..len]).collect();
