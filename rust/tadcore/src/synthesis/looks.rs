@@ -5,7 +5,8 @@
 //! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a small
 //!    fixed second part B. Each descends without long jumps between basins and comes back to the real gains A, A + B
 //!    and A − B, from where Newton finishes.
-//! 3. A last look from the best point with one row reversed at a time: GᵀRG does not see the sign of a row.
+//! 3. A last look from the best point with one row, or two, reversed: GᵀRG does not see the sign of a row, so minima
+//!    come in families that differ by signs.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
@@ -37,6 +38,8 @@ const LONGEST_STEP: f64 = 0.3;
 const BASIN: f64 = 1e-6;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
+/// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
+const PAIRS_UP_TO: usize = 8;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 /// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
@@ -84,21 +87,32 @@ pub(super) fn search<const N: usize, const M: usize>(
     look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
     let mut stacked = RealGains::<N, M>::new(problem, 2);
     look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    let (n, from) = (problem.size, g.to_vec());
-    for i in 0..problem.rows {
-        let row = i * n..(i + 1) * n;
-        if from[row.clone()].iter().all(|&x| x == 0.0) {
-            continue;
+    let from = g.to_vec();
+    let m = problem.rows;
+    for i in 0..m {
+        let partners = if m <= PAIRS_UP_TO { i..m } else { i..i + 1 };
+        for j in partners {
+            reverse(problem.size, &from, &[i, j], &mut s.trial);
+            if s.trial != from {
+                finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+            }
         }
-        s.trial.clear();
-        s.trial.extend_from_slice(&from);
-        s.trial[row].iter_mut().for_each(|x| *x = -*x);
-        finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
     }
     if best.look != Look::Canonical {
         best.certified = certify(&mut real, g, variables, s);
     }
     best
+}
+
+/// The gains with the named rows reversed (a row named twice once).
+fn reverse(n: usize, from: &[f64], rows: &[usize; 2], out: &mut Vec<f64>) {
+    out.clear();
+    out.extend_from_slice(from);
+    let distinct = if rows[0] == rows[1] { &rows[..1] } else { &rows[..] };
+    for &i in distinct {
+        // 0 − x, so that a row of zeros stays as it is, to the bit.
+        out[i * n..(i + 1) * n].iter_mut().for_each(|x| *x = 0.0 - *x);
+    }
 }
 
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
