@@ -1,9 +1,11 @@
 """The compiled core. Everything here is reduced (one Kronecker factor); `tadcore` wraps it."""
 
-from typing import Any, Literal, final
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
+
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__"]
 
 __version__: str
 
@@ -107,6 +109,9 @@ class Gains:
     @property
     def certified(self) -> bool: ...
     """Whether the minimum is proved to be global."""
+    @property
+    def look(self) -> Literal["canonical", "complex", "stacked", "reversed"]: ...
+    """The look that found the minimum."""
 
 @final
 class Record:
@@ -128,7 +133,7 @@ class Record:
     """(L+1, n+2, dim); the last row under the network of the last step."""
     @property
     def adjacency(self) -> NDArray[np.bool_]: ...
-    """(L+1, m, N): row i, entry j ≠ i player j, entry i the attacker; the last row repeats the last network in force."""
+    """(L+1, m, N): row i, entry j ≠ i player j, entry i the attacker; the last row repeats the one before."""
     @property
     def gains(self) -> NDArray[np.float64]: ...
     """(L+1, m, N)."""
@@ -145,5 +150,6 @@ class Record:
     @property
     def unconverged(self) -> int: ...
     """Instants whose synthesis stopped short of the tolerance."""
-
-def information_matrix(row: NDArray[np.bool_], player: int) -> Any: ...
+    @property
+    def certified(self) -> int: ...
+    """Rows whose gains are proved to be globally optimal."""

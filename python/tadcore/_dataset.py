@@ -100,6 +100,7 @@ def summary_of(run: Run) -> dict[str, Any]:
         "costs": run.costs,
         "converged": run.converged,
         "unconverged_instants": run.unconverged,
+        "certified_rows": run.certified,
         "synthesis_iterations": run.iterations,
         **{key: value for key, value in provenance(run.scenario).items() if key != "scenario"},
     }

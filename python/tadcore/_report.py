@@ -120,7 +120,7 @@ class Report:
         return "\n".join([*lines, "", textwrap.fill(self.note, 110), ""])
 
     def print(self, console: Console) -> None:
-        """Print the tables and the note, as wide as the console is."""
+        """Print the tables, the note and the verdict, as wide as the console is."""
         from rich.padding import Padding
         from rich.text import Text
 
@@ -132,6 +132,7 @@ class Report:
                 console.print(Text(case, style="bold"))
                 console.print(self._table(wide=False, only=rows))
         console.print(Padding(Text(self.note, style="dim"), (1, 0)))
+        console.print(Text(self.verdict, style="bold green" if self.ok else "bold red"))
 
     def __str__(self) -> str:
         return self.verdict

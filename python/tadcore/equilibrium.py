@@ -52,7 +52,9 @@ class Equilibrium:
         self._players = sc.players
         self._dim = sc.dim
         self.times = times
-        self.P: dict[str, NDArray[np.float64]] = dict(zip(core.groups, core.P, strict=True))
+        solution = core.P
+        solution.flags.writeable = False
+        self.P: dict[str, NDArray[np.float64]] = dict(zip(core.groups, solution, strict=True))
         self.integrator_steps = core.steps
 
     @cached_property

@@ -57,6 +57,7 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.text import Text
 
     target = Path(out)
     if target.exists() and not target.is_dir():
@@ -79,6 +80,8 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
             shutil.rmtree(draft, ignore_errors=True)
     report = Report(rows=report.rows, version=report.version, files=tuple(files))
     report.print(console)
+    pictures = sum(file.suffix == ".png" for file in files)
+    console.print(Text(f"Report and {pictures} figures in {target}" if figures else f"Report in {target}"))
     return report
 
 

@@ -62,6 +62,8 @@ class Run:
         Steps of the synthesis solver, all instants together.
     unconverged : int
         Instants at which the synthesis stopped short of its tolerance.
+    certified : int
+        Rows of the record whose gains are proved to be globally optimal.
     """
 
     scenario: Scenario
@@ -76,6 +78,7 @@ class Run:
     costs: dict[str, float]
     iterations: int
     unconverged: int
+    certified: int
 
     @property
     def converged(self) -> bool:
@@ -161,4 +164,5 @@ def simulate(sc: Scenario) -> Run:
         costs=dict(zip(groups, map(float, record.costs), strict=True)),
         iterations=record.iterations,
         unconverged=record.unconverged,
+        certified=record.certified,
     )

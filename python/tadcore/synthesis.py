@@ -64,6 +64,8 @@ class Gains:
         Relative norm of the gradient at the end.
     certified : bool
         Whether this minimum is proved to be the global one.
+    look : {"canonical", "complex", "stacked", "reversed"}
+        Which look found it: from the canonical start, or one of the further looks for a lower minimum.
     """
 
     players: tuple[str, ...]
@@ -77,6 +79,7 @@ class Gains:
     status: str
     gradient_norm: float
     certified: bool
+    look: Literal["canonical", "complex", "stacked", "reversed"]
 
     def __repr__(self) -> str:
         state = f"converged in {self.iterations}" if self.converged else f"NOT converged ({self.status})"
@@ -151,4 +154,5 @@ def synthesize(
         status=core.status,
         gradient_norm=core.gradient_norm,
         certified=core.certified,
+        look=core.look,
     )

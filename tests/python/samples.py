@@ -35,7 +35,7 @@ def random_game(rng, interaction, n, *, horizon, step=0.01, low=0.4, high=2.5, *
             f_atau=weights(),
         )
         game = replace(game, **fixed)
-        if escape_time(game, 1.2 * horizon) is None:
+        if escape_time(game, 1.2 * horizon, rtol=1e-8) is None:
             return game
 
 

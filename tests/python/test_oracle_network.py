@@ -45,7 +45,7 @@ def test_information_matrices_of_random_networks(interaction):
         for axes in (1, 2, 3):
             for i, row in enumerate(A):
                 assert np.array_equal(net.information_matrix(i, dim=axes), network.information(row, i, axes))
-        assert np.array_equal(net.information_matrix_team(), network.team_information(A[:n]))
+        assert np.array_equal(net.information_matrix_team, network.team_information(A[:n]))
 
 
 @pytest.mark.parametrize("interaction", ["I1", "I2"])

@@ -83,14 +83,14 @@ def best_of_bfgs(game, k, A, rng, runs):
         return theta.theta(game, P, theta.joint(K, A)), gradient[mask]
 
     starts = scale * rng.normal(size=(runs, mask.sum()))
-    return min(minimize(value, x, jac=True, method="BFGS", options={"gtol": 1e-9}).fun for x in starts)
+    return min(minimize(value, x, jac=True, method="BFGS", options={"gtol": 1e-7}).fun for x in starts)
 
 
 def test_bfgs_on_the_full_problem_never_goes_lower():
     rng = np.random.default_rng(64)
     reached = total = 0
     for game, k, A in draws(64):
-        lowest = best_of_bfgs(game, k, A, rng, 5)
+        lowest = best_of_bfgs(game, k, A, rng, 4)
         gains = solved(game, k, A)
         assert 2 * gains.theta <= lowest * (1 + LOWER) + 1e-12
         reached += lowest <= 2 * gains.theta * (1 + 1e-6) + 1e-10
@@ -155,9 +155,9 @@ def test_descent_says_how_it_ended():
         there = np.linalg.norm([np.linalg.norm(g) for g in theta.gradients(game, P, K, A)])
         nowhere = np.linalg.norm([np.linalg.norm(g) for g in theta.gradients(game, P, [0 * x for x in K], A)])
         assert descent.theta >= newton.theta * (1 - LOWER) - 1e-13
-        assert there <= 10 * max(descent.gradient_norm, 1e-13) * nowhere * game.N
+        assert there <= 1e3 * max(descent.gradient_norm, 1e-13) * nowhere  # other variables, another scale
         if descent.converged:
-            assert there <= 1e-5 * nowhere
+            assert there <= 1e-8 * nowhere
     stopped = solved(game, k, A, method="descent", max_iterations=1)
     assert not stopped.converged
     assert stopped.iterations <= 1

@@ -48,6 +48,8 @@ def test_whoever_sees_everyone_plays_the_equilibrium(sc):
     gains = tadcore.synthesize(sc, step=100, adjacency=np.ones((m, 4), dtype=bool))
     feedback = tadcore.solve_equilibrium(sc).feedback
     assert gains.theta < 1e-20
+    assert gains.certified
+    assert gains.look == "canonical"
     for i, player in enumerate(sc.constrained):
         assert np.allclose(gains.rows[i], feedback[player][100], rtol=1e-9, atol=1e-11)
 

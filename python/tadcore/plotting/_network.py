@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
-from ._style import COLUMN, PAGE, look, players
+from ._style import COLUMN, PAGE, look, note, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from tadcore.simulation import Run
 
 Edge = tuple[str, str]
+
+_NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
+_SMALL = 7.5  # points
 
 _OLD: dict[str, Any] = {
     "color": "0.62",
@@ -80,22 +83,13 @@ def network(
         last = k + 1 == len(changes)
         until = end if last else float(changes[k + 1][0])
         _graph(panels[k], players(run), edges, new if k else set(), lost)
-        panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
+        title = panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
+        if panels[k].get_window_extent().width < _NARROW * panels[k].figure.dpi:
+            title.set_fontsize(min(title.get_fontsize(), _SMALL))
     for panel in panels[shown:]:
         panel.set_axis_off()
     if shown and shown < len(changes):
-        panels[shown - 1].annotate(
-            f"{len(changes) - shown} later networks not shown",
-            (0.5, 0.0),
-            xycoords="axes fraction",
-            xytext=(0, -2),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            fontsize="x-small",
-            color="0.3",
-            annotation_clip=False,
-        )
+        note(panels[shown - 1], f"and {len(changes) - shown} more")
     return axes
 
 

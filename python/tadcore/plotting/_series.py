@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ._ends import label_ends
-from ._style import COLUMN, look, new_axes, players
+from ._style import COLUMN, look, new_axes, note, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -229,4 +229,4 @@ def _verticals(ax: Axes, run: Run) -> None:
             ax.axvline(t, linewidth=0.7, linestyle=(0, (4, 2.5)), **kind)
         return
     ax.vlines(times, 0.0, 0.04, transform=ax.get_xaxis_transform(), linewidth=0.4, **kind)
-    ax.set_xlabel(f"{ax.get_xlabel()}\n{len(times)} network changes, ticks at the foot")
+    note(ax, f"{len(times)} network changes, ticks at the foot")

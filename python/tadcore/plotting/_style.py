@@ -126,6 +126,23 @@ def style() -> Iterator[None]:
         yield
 
 
+def note(ax: Axes, text: str) -> None:
+    """Write a small remark under the label of the horizontal axis, or under 3-D axes."""
+    plane = ax.name != "3d"
+    ax.annotate(
+        text,
+        (0.5, 0.0),
+        xycoords=ax.xaxis.label if plane else "axes fraction",
+        xytext=(0, -2),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize="x-small",
+        color="0.3",
+        annotation_clip=False,
+    )
+
+
 def points(renderer: RendererBase) -> float:
     """Return the pixels in one typographic point."""
     pixels: Any = renderer.points_to_pixels(1.0)

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ._labels import Labels
-from ._style import COLUMN, edge_text, look, new_axes, outcome_text, players
+from ._style import COLUMN, edge_text, look, new_axes, note, outcome_text, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -246,7 +246,7 @@ def _edges(ax: Axes, run: Run, labels: Labels) -> None:
         kinds = list({mark.text: mark for mark in reversed(marks)}.values())[::-1]
         labelled = kinds[:MAX_EDGE_LABELS]
         which = "each kind" if labelled == kinds else f"the first {len(labelled)} kinds"
-        ax.set_xlabel(f"{ax.get_xlabel()}\n{len(run.network_changes) - 1} network changes; {which} labelled once")
+        note(ax, f"{len(run.network_changes) - 1} network changes, {which} labelled once")
     keep = {id(mark) for mark in labelled}
     for mark in marks:
         named = id(mark) in keep

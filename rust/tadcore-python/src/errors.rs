@@ -6,10 +6,8 @@ use tadcore::error::{EquilibriumError, GameError, RunError};
 use tadcore::game::Game;
 
 fn raise(py: Python<'_>, class: &str, arguments: impl for<'py> pyo3::call::PyCallArgs<'py>) -> PyErr {
-    let made = py
-        .import("tadcore.errors")
-        .and_then(|module| module.getattr(class))
-        .and_then(|class| class.call1(arguments));
+    let made =
+        py.import("tadcore.errors").and_then(|module| module.getattr(class)).and_then(|class| class.call1(arguments));
     match made {
         Ok(instance) => PyErr::from_value(instance),
         Err(error) => error,
@@ -36,9 +34,7 @@ pub(crate) fn equilibrium(py: Python<'_>, game: &Game, error: &EquilibriumError)
         EquilibriumError::FiniteEscape { escape_time, horizon } => {
             raise(py, "NoEquilibriumError", (*escape_time, *horizon, game.grid().step()))
         }
-        EquilibriumError::StepBudget { .. } => {
-            raise(py, "TadcoreError", (error.to_string(),))
-        }
+        EquilibriumError::StepBudget { .. } => raise(py, "TadcoreError", (error.to_string(),)),
         EquilibriumError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),
     }
 }

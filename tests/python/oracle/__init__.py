@@ -7,7 +7,8 @@ appears where a search over many starts would not be feasible otherwise, and is 
 module         what it computes
 =============  =====================================================================
 model          weights, the paper's B, S, Q, F; the eight runs of section 6
-riccati        eq:Riccati and eq:RDE in full, the Hamiltonian closed form, the escape time
+riccati        eq:Riccati and eq:RDE in full, the Hamiltonian closed form, the escape time of I2
+escape         escape times of I1 in extended precision
 network        Ad, Phi, A and I_i in full
 theta          Theta_1, Theta_2, their terms and the printed gradients in 2 x 2 blocks
 search         a trust-region Newton method in real or complex gains

@@ -1,6 +1,7 @@
 """Weights and matrices of the game (section 2 of the paper), and the eight runs of its section 6."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -60,29 +61,34 @@ class Game:
 
     def matrices(self, axes=2):
         """B, R, S, Q and F of every group, multiplied out with the identity of `axes` axes (1: reduced)."""
-        n, N = self.n, self.N
-        B = {"d": np.vstack([np.eye(n), np.zeros((1, n))]), "tau": np.eye(N)[:, n:], "a": -np.ones((N, 1))}
-        R = {"d": np.diag(self.r_d), "tau": np.diag([self.r_tau]), "a": np.diag([self.r_a])}
-        if self.interaction == "I1":
-            lam, pad = self.evasion, np.zeros(n)
-            Q = {
-                "d": np.diag([*self.q_da, 0.0]),
-                "tau": np.diag([*pad, -self.q_taua]),
-                "a": np.diag([*(-lam * np.array(self.q_ad)), self.q_atau]),
-            }
-            F = {
-                "d": np.diag([*self.f_da, 0.0]),
-                "tau": np.diag([*pad, -self.f_taua]),
-                "a": np.diag([*(-lam * np.array(self.f_ad)), self.f_atau]),
-            }
-        else:
-            B["dtau"] = np.hstack([B["d"], B["tau"]])
-            R["dtau"] = np.diag([*self.r_d, self.r_tau])
-            Q = {"team": np.diag([*(-np.array(self.q_ad)), self.q_atau])}
-            F = {"team": np.diag([*(-np.array(self.f_ad)), self.f_atau])}
-        S = {p: B[p] @ np.linalg.inv(R[p]) @ B[p].T for p in B}
-        eye = np.eye(axes)
-        return tuple({p: np.kron(X, eye) for p, X in part.items()} for part in (B, R, S, Q, F))
+        return _matrices(self, axes)
+
+
+@cache
+def _matrices(game, axes):
+    n, N = game.n, game.N
+    B = {"d": np.vstack([np.eye(n), np.zeros((1, n))]), "tau": np.eye(N)[:, n:], "a": -np.ones((N, 1))}
+    R = {"d": np.diag(game.r_d), "tau": np.diag([game.r_tau]), "a": np.diag([game.r_a])}
+    if game.interaction == "I1":
+        lam, pad = game.evasion, np.zeros(n)
+        Q = {
+            "d": np.diag([*game.q_da, 0.0]),
+            "tau": np.diag([*pad, -game.q_taua]),
+            "a": np.diag([*(-lam * np.array(game.q_ad)), game.q_atau]),
+        }
+        F = {
+            "d": np.diag([*game.f_da, 0.0]),
+            "tau": np.diag([*pad, -game.f_taua]),
+            "a": np.diag([*(-lam * np.array(game.f_ad)), game.f_atau]),
+        }
+    else:
+        B["dtau"] = np.hstack([B["d"], B["tau"]])
+        R["dtau"] = np.diag([*game.r_d, game.r_tau])
+        Q = {"team": np.diag([*(-np.array(game.q_ad)), game.q_atau])}
+        F = {"team": np.diag([*(-np.array(game.f_ad)), game.f_atau])}
+    S = {p: B[p] @ np.linalg.inv(R[p]) @ B[p].T for p in B}
+    eye = np.eye(axes)
+    return tuple({p: np.kron(X, eye) for p, X in part.items()} for part in (B, R, S, Q, F))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Who sees whom: Ad, Phi, the augmented adjacency and the information matrices (eq:limob to eq:infomatrix)."""
 
+from functools import cache
+
 import numpy as np
 
 
@@ -27,11 +29,16 @@ def from_parts(Ad, phi_a, phi_tau):
 
 def information(row, i, axes=2):
     """I_i of eq:infomatrix as printed; `row` is row i of the augmented adjacency."""
+    return _information(tuple(bool(x) for x in row), i, axes)
+
+
+@cache
+def _information(row, i, axes):
     N = len(row)
     e = np.eye(N)[:, [i]]
-    return np.kron(
-        np.diag(np.asarray(row, dtype=float)) @ (np.eye(N) - np.kron(e.T, np.ones((N, 1)) - e)), np.eye(axes)
-    )
+    out = np.kron(np.diag(row).astype(float) @ (np.eye(N) - np.kron(e.T, np.ones((N, 1)) - e)), np.eye(axes))
+    out.setflags(write=False)
+    return out
 
 
 def team_information(A, axes=2):

@@ -47,8 +47,12 @@ def as_mapping(game, start):
     }
 
 
+def game_of(entry):
+    """Return the game of one entry of a table."""
+    return Game(**{k: tuple(v) if isinstance(v, list) else v for k, v in entry["game"].items()})
+
+
 def from_table(entry):
     """Return the game and the start of one entry of a table; a radius that is null is infinite."""
-    given = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["game"].items()}
     zeta = np.array([np.inf if z is None else z for z in entry["zeta"]])
-    return Game(**given), Start(np.array(entry["positions"], dtype=float), zeta, np.array(entry["sigma"]))
+    return game_of(entry), Start(np.array(entry["positions"], dtype=float), zeta, np.array(entry["sigma"]))

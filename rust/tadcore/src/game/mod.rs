@@ -148,11 +148,8 @@ impl Game {
     pub fn state_weights(&self, terminal: bool) -> Vec<Vec<f64>> {
         let w = &self.weights;
         let n = self.n();
-        let (da, ad, atau, taua) = if terminal {
-            (&w.f_da, &w.f_ad, w.f_atau, w.f_taua)
-        } else {
-            (&w.q_da, &w.q_ad, w.q_atau, w.q_taua)
-        };
+        let (da, ad, atau, taua) =
+            if terminal { (&w.f_da, &w.f_ad, w.f_atau, w.f_taua) } else { (&w.q_da, &w.q_ad, w.q_atau, w.q_taua) };
         let evasion = if self.interaction == Interaction::I1 { w.lambda } else { 1.0 };
         let mut attacker: Vec<f64> = ad.iter().map(|&v| -evasion * v).collect();
         attacker.push(atau);

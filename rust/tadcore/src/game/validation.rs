@@ -22,11 +22,8 @@ fn length(field: &'static str, found: usize, expected: usize) -> Result<(), Game
 /// Checks every weight of `w` for an `interaction` of n defenders.
 pub(crate) fn weights(interaction: Interaction, n: usize, w: &Weights) -> Result<(), GameError> {
     rule("defenders", n as f64, n >= 1, "at least one defender")?;
-    let both: [(&'static str, &[f64]); 3] = [
-        ("control_weight", &w.r_d),
-        ("evasion_running_weight", &w.q_ad),
-        ("evasion_terminal_weight", &w.f_ad),
-    ];
+    let both: [(&'static str, &[f64]); 3] =
+        [("control_weight", &w.r_d), ("evasion_running_weight", &w.q_ad), ("evasion_terminal_weight", &w.f_ad)];
     let first: [(&'static str, &[f64]); 2] = [("running_weight", &w.q_da), ("terminal_weight", &w.f_da)];
     let with_own = if interaction == Interaction::I1 { &first[..] } else { &[] };
     for &(field, values) in both.iter().chain(with_own) {

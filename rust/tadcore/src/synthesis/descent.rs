@@ -15,14 +15,19 @@ const MEMORY: usize = 10;
 const HALVINGS: usize = 60;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
-pub(super) fn descend<O: Objective>(objective: &mut O, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
+pub(super) fn descend<O: Objective>(
+    objective: &mut O,
+    g: &mut [f64],
+    variables: &[Variable],
+    limits: Limits,
+) -> Reached {
     let d = variables.len();
     let mut full = vec![0.0; objective.width()];
     let (mut gradient, mut next) = (vec![0.0; d], vec![0.0; d]);
     let mut value = objective.value(g);
     objective.gradient(g, &mut full);
     restrict(&full, variables, &mut gradient);
-    let mut recent = vec![value; MEMORY];
+    let mut recent = [value; MEMORY];
     let mut length = 0.1 * norm(g) / norm(&gradient).max(f64::MIN_POSITIVE);
     let mut iterations = 0;
     let status = loop {

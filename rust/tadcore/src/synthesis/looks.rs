@@ -127,12 +127,8 @@ fn look<const N: usize, const M: usize, O: Objective>(
     s.pair.extend_from_slice(start);
     s.pair.resize(2 * width, 0.0);
     start::advance(&mut s.pair[width..], variables, &s.shift);
-    let short = Limits {
-        iterations: LOOK_ITERATIONS,
-        tolerance: BASIN,
-        acceptable: BASIN,
-        longest: LONGEST_STEP * scale,
-    };
+    let short =
+        Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale };
     best.iterations += minimise(doubled, &mut s.pair, &s.doubled, short, &mut s.newton).iterations;
     for sign in [0.0, 1.0, -1.0] {
         let (a, b) = s.pair.split_at(width);
@@ -164,7 +160,12 @@ fn finish<const N: usize, const M: usize>(
 
 /// Whether the certificate proves the critical point `g` to be a global minimiser.
 #[inline(always)]
-pub(super) fn certify<const N: usize, const M: usize>(real: &mut RealGains<N, M>, g: &[f64], variables: &[Variable], s: &mut Scratch) -> bool {
+pub(super) fn certify<const N: usize, const M: usize>(
+    real: &mut RealGains<N, M>,
+    g: &[f64],
+    variables: &[Variable],
+    s: &mut Scratch,
+) -> bool {
     let (d, width) = (variables.len(), real.width());
     real.value(g);
     s.form.resize(width * width, 0.0);

@@ -276,13 +276,30 @@ mod tests {
 
 #[doc(hidden)]
 impl Synthesizer {
-    pub fn unknowns(&mut self, t: &Topology) -> usize { start::variables(t, &mut self.variables); self.variables.len() }
+    pub fn unknowns(&mut self, t: &Topology) -> usize {
+        start::variables(t, &mut self.variables);
+        self.variables.len()
+    }
     pub fn from(&mut self, p: &Problem, t: &Topology, x: &[f64]) -> Gains {
         start::variables(t, &mut self.variables);
         let mut g = vec![0.0; p.rows * p.size];
         start::advance(&mut g, &self.variables, x);
         let mut o = RealGains::<0, 0>::new(p, 1);
-        let r = newton::minimise(&mut o, &mut g, &self.variables, Limits { iterations: 1000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY }, &mut self.scratch.newton);
-        Gains { rows: g, theta: r.value, gradient_norm: r.gradient_norm, iterations: r.iterations, status: r.status, certified: false, look: Look::Canonical }
+        let r = newton::minimise(
+            &mut o,
+            &mut g,
+            &self.variables,
+            Limits { iterations: 1000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY },
+            &mut self.scratch.newton,
+        );
+        Gains {
+            rows: g,
+            theta: r.value,
+            gradient_norm: r.gradient_norm,
+            iterations: r.iterations,
+            status: r.status,
+            certified: false,
+            look: Look::Canonical,
+        }
     }
 }

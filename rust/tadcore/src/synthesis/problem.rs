@@ -72,8 +72,7 @@ impl Problem {
         for w in &coupling {
             for i in 0..rows {
                 for j in 0..rows {
-                    coupling_gram[i * rows + j] +=
-                        (0..size).map(|a| w[i * size + a] * w[j * size + a]).sum::<f64>();
+                    coupling_gram[i * rows + j] += (0..size).map(|a| w[i * size + a] * w[j * size + a]).sum::<f64>();
                 }
             }
         }
@@ -128,9 +127,8 @@ impl Problem {
             Interaction::I1 => {
                 let coupled = |group: usize| -> f64 {
                     let matrix = &p[group * n * n..(group + 1) * n * n];
-                    let product = |a: usize, b: usize| -> f64 {
-                        (0..m).map(|i| matrix[i * n + a] * delta[i * n + b]).sum()
-                    };
+                    let product =
+                        |a: usize, b: usize| -> f64 { (0..m).map(|i| matrix[i * n + a] * delta[i * n + b]).sum() };
                     let mut sum = 0.0;
                     for a in 0..n {
                         for b in 0..n {
