@@ -125,8 +125,7 @@ impl Coupled {
                     let sum = tile::<W, R>(&matrix[..defenders * l], l, i, m);
                     for r in 0..R {
                         let (u, v) = (half_tau * u[i + r], half_a * v[i + r]);
-                        g[(i + r) * strips + s] =
-                            std::array::from_fn(|c| half_d * sum[r][c] + (u * t[c] + v * a[c]));
+                        g[(i + r) * strips + s] = std::array::from_fn(|c| half_d * sum[r][c] + (u * t[c] + v * a[c]));
                     }
                     i += R;
                 }

@@ -25,8 +25,8 @@ use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 
 /// Attempted steps after which the integrator gives up. A game that needs more is stiff (a rate some 10⁶ times the
-/// inverse of the horizon), not escaping.
-const STEP_BUDGET: usize = 2_000_000;
+/// inverse of the horizon), not escaping; ordinary games take some hundred steps, the wildest seen 10⁴.
+const STEP_BUDGET: usize = 300_000;
 /// Attempts between two polls of the cancel token.
 const POLL: usize = 64;
 /// Distance to a pole, relative to s, at which it is reported.
@@ -141,9 +141,9 @@ impl Workspace {
     fn first_step(&self, horizon: f64) -> f64 {
         let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let blocks = self.y.chunks(self.block).zip(self.stage(0).chunks(self.block));
-        blocks.map(|(y, dy)| (largest(y), largest(dy))).fold(horizon, |h, (size, rate)| {
-            if size > 0.0 && rate > 0.0 { h.min(0.01 * size / rate) } else { h }
-        })
+        blocks
+            .map(|(y, dy)| (largest(y), largest(dy)))
+            .fold(horizon, |h, (size, rate)| if size > 0.0 && rate > 0.0 { h.min(0.01 * size / rate) } else { h })
     }
 
     /// The largest relative growth of a block at the new point.

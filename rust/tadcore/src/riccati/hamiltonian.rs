@@ -68,8 +68,7 @@ impl Flow {
         let weights = game.weights();
         let n = game.size();
         let inverse: Vec<f64> = weights.r_d.iter().chain([&weights.r_tau]).map(|r| 1.0 / r).collect();
-        let balance: Vec<f64> =
-            inverse.iter().map(|r| (0.5 * (r + 1.0 / weights.r_a).log2()).round().exp2()).collect();
+        let balance: Vec<f64> = inverse.iter().map(|r| (0.5 * (r + 1.0 / weights.r_a).log2()).round().exp2()).collect();
         let s_diagonal: Vec<f64> = inverse.iter().zip(&balance).map(|(r, d)| -(r / d) / d).collect();
         let w: Vec<f64> = balance.iter().map(|d| (1.0 / weights.r_a).sqrt() / d).collect();
         let q: Vec<f64> = game.state_weights(false)[0].iter().zip(&balance).map(|(q, d)| q * d * d).collect();

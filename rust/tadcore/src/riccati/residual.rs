@@ -2,8 +2,10 @@
 //!
 //! Residual at t_k, for each group: ‖Ṗ + Q − PA − AᵀP + P S P‖ / (‖Q‖ + 2‖PA‖ + ‖P S P‖), in I2 ‖Ṗ + Q − P S P‖ /
 //! (‖Q‖ + ‖P S P‖), with dense S_p and A as in the paper: nothing is shared with the solvers. Ṗ is the difference of
-//! order 8 of nine stored nodes whose distance is about 1/20 of the time scale of the equation; nothing else is known
+//! order 8 of nine stored nodes whose distance is about 1/30 of the time scale of the equation; nothing else is known
 //! of how they came about.
+//!
+//! (A P that hardly changes has rounding in its digits only: a change of 10⁻⁸ P per distance is added to the terms.)
 //!
 //! A grid too coarse for differences is checked step by step: the printed equation is integrated from t_{k+1} to t_k,
 //! and the residual is the mismatch with the stored node, relative to the smaller of ‖P‖ and what a step can change.
@@ -24,10 +26,13 @@ use crate::game::{Game, Interaction};
 
 /// Nodes of a difference.
 const POINTS: usize = 9;
-/// Distance of its nodes times the rate of the equation, at most, where the grid allows a choice.
-const SPACING: f64 = 0.05;
-/// Distance times rate above which a difference is not trusted.
-const COARSE: f64 = 0.15;
+/// Distance of its nodes times the largest rate at them, at most, where the grid allows a choice.
+const SPACING: f64 = 0.03;
+/// Distance times rate above which a difference is not trusted: centred, whose error constant is 1/630, and one-sided,
+/// up to 1/9.
+const COARSE: (f64, f64) = (0.12, 0.06);
+/// A change of P by less than this part of it cannot be seen to more than 1e-8 in the rounded nodes.
+const ROUNDING: f64 = 1e-8;
 /// Tolerance of a fresh integration.
 const TOLERANCE: f64 = 1e-13;
 
@@ -46,8 +51,6 @@ struct Evaluation {
     derivative: Vec<f64>,
     /// Norms of its terms, per group.
     scale: Vec<f64>,
-    /// How fast the equation can change its solution.
-    rate: f64,
 }
 
 impl Textbook {
@@ -75,18 +78,27 @@ impl Textbook {
         Self { n, interaction: game.interaction(), s, q, block: (n * n).next_multiple_of(LANES) }
     }
 
-    /// `p`: one N × N matrix per group.
-    fn evaluate(&self, p: &[&[f64]]) -> Evaluation {
-        let n = self.n;
-        let mut a = vec![0.0; n * n];
+    /// A = Σ S P.
+    fn closed_loop(&self, p: &[&[f64]]) -> Vec<f64> {
+        let mut a = vec![0.0; self.n * self.n];
         for (s, p) in self.s.iter().zip(p) {
-            for (a, v) in a.iter_mut().zip(multiply(n, s, p)) {
+            for (a, v) in a.iter_mut().zip(multiply(self.n, s, p)) {
                 *a += v;
             }
         }
-        let s_norm = self.s.iter().map(|s| norm(s)).fold(0.0, f64::max);
-        let q_norm = self.q.iter().map(|q| norm(q)).fold(0.0, f64::max);
-        let rate = 2.0 * norm(&a) + (s_norm * q_norm).sqrt();
+        a
+    }
+
+    /// How fast the equation can change its solution: 2‖A‖ + (‖S‖ ‖Q‖)^½.
+    fn rate(&self, p: &[&[f64]]) -> f64 {
+        let largest = |m: &[Vec<f64>]| m.iter().map(|m| norm(m)).fold(0.0, f64::max);
+        2.0 * norm(&self.closed_loop(p)) + (largest(&self.s) * largest(&self.q)).sqrt()
+    }
+
+    /// `p`: one N × N matrix per group.
+    fn evaluate(&self, p: &[&[f64]]) -> Evaluation {
+        let n = self.n;
+        let a = self.closed_loop(p);
         let (mut derivative, mut scale) = (Vec::new(), Vec::new());
         for ((p, s), q) in p.iter().zip(&self.s).zip(&self.q) {
             let psp = multiply(n, &multiply(n, p, s), p);
@@ -103,7 +115,7 @@ impl Textbook {
                 }
             }
         }
-        Evaluation { derivative, scale, rate }
+        Evaluation { derivative, scale }
     }
 }
 
@@ -131,7 +143,7 @@ impl Flow for Textbook {
 fn multiply(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; n * n];
     for (row, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
-        for (a, b) in a.iter().zip(b.chunks_exact(n)) {
+        for (a, b) in a.iter().zip(b.chunks_exact(n)).filter(|(a, _)| **a != 0.0) {
             for (o, b) in row.iter_mut().zip(b) {
                 *o += a * b;
             }
@@ -162,43 +174,83 @@ fn difference(at: usize) -> [f64; POINTS] {
     w
 }
 
+/// Nine nodes around one node.
+struct Stencil {
+    /// Nodes before the one of interest.
+    before: usize,
+    /// Distance in steps of the grid.
+    stride: usize,
+}
+
+impl Stencil {
+    /// The widest stencil about `k`, centred where the ends of the grid allow, whose distance resolves the rates at all
+    /// its nodes; `None` if the grid is too coarse.
+    fn about(k: usize, step: f64, rates: &[f64]) -> Option<Self> {
+        let steps = rates.len() - 1;
+        if steps + 1 < POINTS {
+            return None;
+        }
+        let mut stride = ((SPACING / (rates[k] * step)) as usize).clamp(1, steps / (POINTS - 1));
+        loop {
+            let after = (POINTS / 2).min((steps - k) / stride);
+            let before = (POINTS - 1 - after).min(k / stride);
+            let stencil = Self { before, stride };
+            let fits = k + (POINTS - 1 - before) * stride <= steps;
+            let rate =
+                if fits { (0..POINTS).map(|j| rates[stencil.node(k, j)]).fold(0.0, f64::max) } else { f64::INFINITY };
+            let distance = rate * stride as f64 * step;
+            let coarse = if before == POINTS / 2 { COARSE.0 } else { COARSE.1 };
+            if distance <= SPACING || (stride == 1 && distance <= coarse) {
+                return Some(stencil);
+            }
+            if stride == 1 {
+                return None;
+            }
+            stride = (stride * 3 / 4).max(1);
+        }
+    }
+
+    fn node(&self, k: usize, j: usize) -> usize {
+        k + j * self.stride - self.before * self.stride
+    }
+}
+
 /// See [`Equilibrium::residual`].
 pub(super) fn residual(equilibrium: &Equilibrium, game: &Game) -> Vec<f64> {
     let (n, steps, groups) = (equilibrium.size(), equilibrium.steps(), equilibrium.groups());
     let (len, step) = (n * n, game.grid().step());
     let mut book = Textbook::new(game);
+    let terminal = game.state_weights(true);
     let weights: [[f64; POINTS]; POINTS] = std::array::from_fn(difference);
+    let mut rates = Vec::with_capacity(steps + 1);
+    for k in 0..=steps {
+        rates.push(book.rate(&node(equilibrium, k)));
+    }
     let mut out = vec![0.0; groups * (steps + 1)];
     for k in 0..=steps {
-        let p: Vec<&[f64]> = (0..groups).map(|g| equilibrium.p(g, k)).collect();
+        let p = node(equilibrium, k);
         let value = book.evaluate(&p);
-        let resolved = steps + 1 >= POINTS && value.rate * step <= COARSE;
-        let stride = ((SPACING / (value.rate * step)) as usize).clamp(1, (steps / (POINTS - 1)).max(1));
-        let fresh = if !resolved && k < steps { again(&mut book, equilibrium, k, step) } else { None };
+        let stencil = Stencil::about(k, step, &rates);
+        let fresh = if stencil.is_none() && k < steps { again(&mut book, equilibrium, k, step) } else { None };
         for g in 0..groups {
-            let d = &value.derivative[g * len..(g + 1) * len];
             let mut worst = 0.0_f64;
-            if resolved {
-                // Nine nodes `stride` apart, centred on k where the ends of the grid allow.
-                let before = (k / stride).min(POINTS / 2).max((POINTS - 1).saturating_sub((steps - k) / stride));
-                let before = before.min(k / stride);
-                let mut defect = d.to_vec();
-                for (j, w) in weights[before].iter().enumerate() {
-                    let node = equilibrium.p(g, k + j * stride - before * stride);
-                    for (x, p) in defect.iter_mut().zip(node) {
-                        *x += w * p / (stride as f64 * step);
+            if let Some(stencil) = &stencil {
+                let mut defect = value.derivative[g * len..(g + 1) * len].to_vec();
+                for (j, w) in weights[stencil.before].iter().enumerate() {
+                    let factor = w / (stencil.stride as f64 * step);
+                    for (x, p) in defect.iter_mut().zip(equilibrium.p(g, stencil.node(k, j))) {
+                        *x += factor * p;
                     }
                 }
-                worst = norm(&defect) / value.scale[g];
+                worst = norm(&defect) / (value.scale[g] + ROUNDING * norm(p[g]) / (stencil.stride as f64 * step));
+            } else if let Some(fresh) = &fresh {
+                let defect: Vec<f64> = p[g].iter().zip(&fresh[g * book.block..]).map(|(a, b)| a - b).collect();
+                worst = norm(&defect) / norm(p[g]).min(step * value.scale[g] + ROUNDING * norm(p[g]));
             } else if k < steps {
                 worst = f64::INFINITY;
-                if let Some(fresh) = &fresh {
-                    let defect: Vec<f64> = p[g].iter().zip(&fresh[g * book.block..]).map(|(a, b)| a - b).collect();
-                    worst = norm(&defect) / norm(p[g]).min(step * value.scale[g]);
-                }
             }
             if k == steps {
-                let f = &game.state_weights(true)[g];
+                let f = &terminal[g];
                 let defect: Vec<f64> =
                     (0..len).map(|ij| p[g][ij] - if ij / n == ij % n { f[ij / n] } else { 0.0 }).collect();
                 worst = worst.max(norm(&defect) / norm(f));
@@ -207,6 +259,10 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game) -> Vec<f64> {
         }
     }
     out
+}
+
+fn node(equilibrium: &Equilibrium, k: usize) -> Vec<&[f64]> {
+    (0..equilibrium.groups()).map(|g| equilibrium.p(g, k)).collect()
 }
 
 /// P at t_k from the stored P at t_{k+1}, as a padded stack.
