@@ -7,8 +7,8 @@ networks are those of the Criterion bench, random of density ½. All begin at th
 - LM, reduced: `least_squares(method="lm")` with the exact Jacobian of one Kronecker factor;
 - Newton, Numba: damped Newton with the exact Hessian, compiled (not in a quick run);
 - tadcore, from Python: one call of `synthesize`; tadcore, less the call: the same less a call under the empty network,
-  which has nothing to minimise. At n = 3 that difference of two times is no more than an upper bound: the few
-  microseconds are what `cargo bench --bench synthesis` resolves.
+  which has nothing to minimise. At n = 3 a few microseconds remain of two much longer times, noise
+  of both included: `cargo bench --bench synthesis` is what resolves them.
 
 How to read the table: times are CPU times of the process. Networks are of two kinds. `certified`: one descent is
 proved to reach the global minimum, so tadcore makes no other, and all contenders do equal work. `searched`: no proof,
