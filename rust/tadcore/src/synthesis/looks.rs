@@ -66,7 +66,6 @@ pub(super) struct Best {
 }
 
 /// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
-#[inline(always)]
 pub(super) fn search<const N: usize, const M: usize>(
     problem: &Problem,
     variables: &[Variable],
@@ -116,7 +115,6 @@ fn reverse(n: usize, from: &[f64], rows: &[usize; 2], out: &mut Vec<f64>) {
 }
 
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
-#[inline(always)]
 fn look<const N: usize, const M: usize, O: Objective>(
     doubled: &mut O,
     name: Look,
@@ -153,7 +151,6 @@ fn look<const N: usize, const M: usize, O: Objective>(
 }
 
 /// Newton from `s.trial`; keeps the point in `g` when it is lower.
-#[inline(always)]
 fn finish<const N: usize, const M: usize>(
     name: Look,
     real: &mut RealGains<N, M>,
@@ -173,7 +170,6 @@ fn finish<const N: usize, const M: usize>(
 }
 
 /// Whether the certificate proves the critical point `g` to be a global minimiser.
-#[inline(always)]
 pub(super) fn certify<const N: usize, const M: usize>(
     real: &mut RealGains<N, M>,
     g: &[f64],
