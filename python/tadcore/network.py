@@ -192,6 +192,8 @@ def changes_of(
 
     ``adjacency`` has one row for each instant at which a network was in force; the terminal instant is not one.
     """
+    if not len(times):
+        return ()
     changes = [NetworkChange(float(times[0]), edges_of(adjacency[0], players), ())]
     for k in np.flatnonzero((adjacency[1:] != adjacency[:-1]).any(axis=(1, 2))) + 1:
         before, after = adjacency[k - 1], adjacency[k]

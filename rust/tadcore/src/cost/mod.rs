@@ -26,7 +26,8 @@ const DEGREE: usize = 16;
 /// Pieces of one step.
 const PIECES: usize = 1 << 12;
 
-/// J of each player along `record`: [J_d, J_τ, J_a] in I1, [J] in I2 (minimised by the attacker, maximised by the team).
+/// J of each player along `record`: J_d, J_τ, J_a in I1, the one J in I2 (minimised by the attacker, maximised by the
+/// team).
 #[must_use]
 pub fn costs(policy: &Policy, record: &Record) -> Vec<f64> {
     let game = policy.game();

@@ -1,12 +1,13 @@
 //! From the canonical start to the global minimum: which descents are made, and when no more are needed.
 //!
-//! 1. Newton from the canonical start. Most entries end here: the certificate of [`super::objective`] proves the
+//! 1. Newton from the canonical start. Most entries end here: the certificate of `objective` proves the
 //!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
-//! 2. Otherwise a second look in complex gains, with a small and with a large second part B, and a third in stacked
-//!    gains, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins and comes back to the real gains A, A + B
+//! 2. Otherwise a second look in complex gains and a third in stacked gains, each with a small and with a large second
+//!    part B, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins and comes back to the real gains A, A + B
 //!    and A − B, from where Newton finishes.
-//! 3. A last look from the best point with one row, or two, reversed: GᵀRG does not see the sign of a row, so minima
-//!    come in families that differ by signs. Then Newton once more from the canonical start without one row at a time.
+//! 3. A fourth look from the best point with one row, or two, reversed: GᵀRG does not see the sign of a row, so minima
+//!    come in families that differ by signs. Then Newton once more from the canonical start without one row at a time,
+//!    and from eight fixed starts.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
@@ -26,8 +27,10 @@ pub enum Look {
     Complex,
     /// The third look, in stacked gains.
     Stacked,
-    /// The last look, with rows reversed or left out.
+    /// The fourth look, with rows reversed or left out.
     Reversed,
+    /// The last look, from fixed starts.
+    Fixed,
 }
 
 /// Sizes of the second part B at the start, relative to ‖F‖: a small one, and one as large as the gains themselves.
@@ -40,6 +43,8 @@ const BASIN: f64 = 1e-6;
 const LOOK_ITERATIONS: usize = 300;
 /// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
 const PAIRS_UP_TO: usize = 8;
+/// Fixed starts of the last look.
+const FIXED_STARTS: usize = 8;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 /// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
@@ -87,7 +92,9 @@ pub(super) fn search<const N: usize, const M: usize>(
         look(&mut complex, Look::Complex, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
     }
     let mut stacked = RealGains::<N, M>::new(problem, 2);
-    look(&mut stacked, Look::Stacked, FAR[0], problem, &mut real, variables, &start, g, &mut best, limits, s);
+    for far in FAR {
+        look(&mut stacked, Look::Stacked, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
+    }
     let from = g.to_vec();
     let m = problem.rows;
     for i in 0..m {
@@ -100,6 +107,14 @@ pub(super) fn search<const N: usize, const M: usize>(
         }
         scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
         finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+    }
+    let scale = norm(&problem.fne) / (variables.len() as f64).sqrt();
+    for pattern in 0..FIXED_STARTS {
+        spread(variables.len(), 2.0 * scale, (pattern + 2) as f64, &mut s.shift);
+        s.trial.clear();
+        s.trial.resize(start.len(), 0.0);
+        start::advance(&mut s.trial, variables, &s.shift);
+        finish(Look::Fixed, &mut real, variables, g, &mut best, limits, s);
     }
     if best.look != Look::Canonical {
         best.certified = certify(&mut real, g, variables, s);
@@ -115,6 +130,12 @@ fn scale_rows(n: usize, from: &[f64], rows: &[usize; 2], factor: f64, out: &mut 
     for &i in distinct {
         out[i * n..(i + 1) * n].iter_mut().for_each(|x| *x *= factor);
     }
+}
+
+/// A fixed pattern of numbers between −size and size, without symmetry: the golden angle spreads it.
+fn spread(len: usize, size: f64, phase: f64, out: &mut Vec<f64>) {
+    out.clear();
+    out.extend((0..len).map(|v| size * (phase + phase * 2.399_963_229_728_653 * v as f64).cos()));
 }
 
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
@@ -136,9 +157,7 @@ fn look<const N: usize, const M: usize, O: Objective>(
     s.doubled.extend_from_slice(variables);
     s.doubled.extend(variables.iter().map(|v| Variable { entry: v.entry + width, own: v.own + width, ..*v }));
     let size = far * scale / (variables.len() as f64).sqrt();
-    s.shift.clear();
-    // A fixed pattern without symmetry; the golden angle spreads it.
-    s.shift.extend((0..variables.len()).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()));
+    spread(variables.len(), size, 1.0, &mut s.shift);
     s.pair.clear();
     s.pair.extend_from_slice(start);
     s.pair.resize(2 * width, 0.0);
