@@ -78,7 +78,7 @@ impl Gains {
         self.gains.certified
     }
 
-    /// The look that found the minimum: canonical, complex, stacked, reversed or fixed.
+    /// The look that found the minimum: canonical, complex, stacked or reversed.
     #[getter]
     fn look(&self) -> &'static str {
         match self.gains.look {
@@ -86,7 +86,6 @@ impl Gains {
             Look::Complex => "complex",
             Look::Stacked => "stacked",
             Look::Reversed => "reversed",
-            Look::Fixed => "fixed",
         }
     }
 }

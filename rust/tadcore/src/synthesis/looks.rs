@@ -3,11 +3,11 @@
 //! 1. Newton from the canonical start. Most entries end here: the certificate of `objective` proves the
 //!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
 //! 2. Otherwise a second look in complex gains and a third in stacked gains, each with a small and with a large second
-//!    part B, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins and comes back to the real gains A, A + B
-//!    and A − B, from where Newton finishes.
-//! 3. A fourth look from the best point with one row, or two, reversed: GᵀRG does not see the sign of a row, so minima
-//!    come in families that differ by signs. Then Newton once more from the canonical start without one row at a time,
-//!    and from eight fixed starts.
+//!    part B, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins
+//!    and comes back to the real gains A, A + B and A − B, from where Newton finishes.
+//! 3. A last look: Newton from the canonical start without one row at a time, then from the best point with one row,
+//!    two rows or one gain reversed, again while that goes lower: GᵀRG does not see the sign of a row, so minima come
+//!    in families that differ by signs.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
@@ -27,10 +27,8 @@ pub enum Look {
     Complex,
     /// The third look, in stacked gains.
     Stacked,
-    /// The fourth look, with rows reversed or left out.
+    /// The last look, with rows or single gains reversed or left out.
     Reversed,
-    /// The last look, from fixed starts.
-    Fixed,
 }
 
 /// Sizes of the second part B at the start, relative to ‖F‖: a small one, and one as large as the gains themselves.
@@ -41,10 +39,10 @@ const LONGEST_STEP: f64 = 0.3;
 const BASIN: f64 = 1e-6;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
-/// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
+/// Constrained players up to which pairs of rows and single gains are reversed too; beyond, one row at a time.
 const PAIRS_UP_TO: usize = 8;
-/// Fixed starts of the last look.
-const FIXED_STARTS: usize = 8;
+/// Rounds of reversals, each from the best point of the one before.
+const ROUNDS: usize = 4;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 /// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
@@ -95,6 +93,33 @@ pub(super) fn search<const N: usize, const M: usize>(
     for far in FAR {
         look(&mut stacked, Look::Stacked, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
     }
+    for i in 0..problem.rows {
+        scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
+        finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+    }
+    for _ in 0..ROUNDS {
+        let before = best.reached.value;
+        reversals(problem, &mut real, variables, g, &mut best, limits, s);
+        if best.reached.value == before {
+            break;
+        }
+    }
+    if best.look != Look::Canonical {
+        best.certified = certify(&mut real, g, variables, s);
+    }
+    best
+}
+
+/// Newton from the point in `g` with one row, two rows or one variable reversed.
+fn reversals<const N: usize, const M: usize>(
+    problem: &Problem,
+    real: &mut RealGains<N, M>,
+    variables: &[Variable],
+    g: &mut [f64],
+    best: &mut Best,
+    limits: Limits,
+    s: &mut Scratch,
+) {
     let from = g.to_vec();
     let m = problem.rows;
     for i in 0..m {
@@ -102,24 +127,18 @@ pub(super) fn search<const N: usize, const M: usize>(
         for j in partners {
             scale_rows(problem.size, &from, &[i, j], -1.0, &mut s.trial);
             if s.trial != from {
-                finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+                finish(Look::Reversed, real, variables, g, best, limits, s);
             }
         }
-        scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
-        finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
     }
-    let scale = norm(&problem.fne) / (variables.len() as f64).sqrt();
-    for pattern in 0..FIXED_STARTS {
-        spread(variables.len(), 2.0 * scale, (pattern + 2) as f64, &mut s.shift);
-        s.trial.clear();
-        s.trial.resize(start.len(), 0.0);
-        start::advance(&mut s.trial, variables, &s.shift);
-        finish(Look::Fixed, &mut real, variables, g, &mut best, limits, s);
+    if m <= PAIRS_UP_TO {
+        for v in variables {
+            s.trial.clear();
+            s.trial.extend_from_slice(&from);
+            start::advance(&mut s.trial, &[*v], &[-2.0 * from[v.entry]]);
+            finish(Look::Reversed, real, variables, g, best, limits, s);
+        }
     }
-    if best.look != Look::Canonical {
-        best.certified = certify(&mut real, g, variables, s);
-    }
-    best
 }
 
 /// The gains with the named rows times `factor` (a row named twice once).
