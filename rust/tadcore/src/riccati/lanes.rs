@@ -176,7 +176,7 @@ widened! {
     pub(super) fn interpolate(out: &mut [f64], y: &[f64], dense: &[f64], theta: f64) {
         let mut weight = 1.0;
         let row: [(usize, f64); DENSE] = std::array::from_fn(|j| {
-            weight *= if j % 2 == 0 { theta } else { 1.0 - theta };
+            weight *= if j.is_multiple_of(2) { theta } else { 1.0 - theta };
             (j, weight)
         });
         step(out, y, dense, &row, 1.0);

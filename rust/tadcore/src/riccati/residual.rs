@@ -163,7 +163,7 @@ fn norm(a: &[f64]) -> f64 {
 /// Weights of the derivative at point `at` of nine equidistant points, for unit distance.
 fn difference(at: usize) -> [f64; POINTS] {
     let binomial = |j: usize| (1..=j).fold(1.0, |b, i| b * (POINTS - i) as f64 / i as f64);
-    let sign = |j: usize| if j % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut w = [0.0; POINTS];
     for j in 0..POINTS {
         if j != at {
