@@ -1,7 +1,8 @@
 """Interaction I1 in NumPy and SciPy, in the paper's own blocks: what a careful reader of it would write.
 
 `axes` = 2 gives the paper's 2N × 2N matrices, `axes` = 1 one Kronecker factor of them: the formulas are the same.
-Whatever an instant alone determines is computed once, and an unseen player is no variable: the peers are not slowed down.
+Whatever an instant alone determines is computed once, and an unseen player is no variable: nothing slows the peers
+down on purpose.
 """
 
 import _side
@@ -24,14 +25,18 @@ def riccati_data(game: _side.Game, axes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def riccati(game: _side.Game, axes: int, tolerance: float = 1e-12) -> np.ndarray:
-    """eq:Riccati backward from T by SciPy's DOP853: P on the grid, (3, K+1, N axes, N axes)."""
+    """eq:Riccati backward from T by SciPy's DOP853: P on the grid, (3, K+1, N axes, N axes).
+
+    Symmetrised at every evaluation: without it rounding alone costs four digits at n = 30.
+    """
     S, Q = riccati_data(game, axes)
 
     def backward(_, y):
         P = y.reshape(Q.shape)
+        P = (P + P.swapaxes(1, 2)) / 2
         SP = S @ P
-        A = SP[0] + SP[1] + SP[2]
-        return (Q - P @ A - A.T @ P + P @ SP).ravel()
+        half = P @ (SP / 2 - (SP[0] + SP[1] + SP[2]))
+        return (Q + half + half.swapaxes(1, 2)).ravel()
 
     nodes = np.linspace(0.0, game.horizon, game.steps + 1)
     solution = solve_ivp(

@@ -8,6 +8,7 @@ import os
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ[_name] = "1"
 
+# ruff: noqa: E402
 import argparse
 import importlib.metadata
 import importlib.util
@@ -81,7 +82,7 @@ def start(description: str) -> bool:
     print(f"{summary}\nPython {platform.python_version()}, {versions}; one thread")
     if hasattr(os, "getloadavg"):
         print(
-            f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores: where other work runs, trust ratios, not times"
+            f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores: where other work runs, read CPU times and ratios"
         )
     return quick
 
@@ -94,21 +95,29 @@ def numba_wanted(quick: bool) -> bool:
     return False
 
 
-def interleave(
-    contenders: Mapping[str, Callable[[], Any]], repetitions: int
-) -> tuple[dict[str, float], dict[str, Any]]:
-    """Run every contender once per round, in turn; return median seconds and the last answers.
+@dataclass(frozen=True)
+class Time:
+    """Median seconds: CPU time of the process, and what the clock on the wall says."""
+
+    cpu: float
+    wall: float
+
+
+def interleave(contenders: Mapping[str, Callable[[], Any]], repetitions: int) -> tuple[dict[str, Time], dict[str, Any]]:
+    """Run every contender once per round, in turn; return median times and the last answers.
 
     Interleaving spreads a slow moment of the machine over all of them. A first round warms up and is not counted.
+    Everyone works on one thread, so CPU time is the work done. The wall clock adds the wait for a free core, which on
+    a busy machine falls mostly on tadcore: it works on a thread of its own, to let Ctrl-C through.
     """
     answers = {name: run() for name, run in contenders.items()}
-    seconds: dict[str, list[float]] = {name: [] for name in contenders}
+    samples: dict[str, list[tuple[float, float]]] = {name: [] for name in contenders}
     for _ in range(repetitions):
         for name, run in contenders.items():
-            begin = time.perf_counter()
+            wall, cpu = time.perf_counter(), time.process_time()
             answers[name] = run()
-            seconds[name].append(time.perf_counter() - begin)
-    return {name: float(np.median(s)) for name, s in seconds.items()}, answers
+            samples[name].append((time.process_time() - cpu, time.perf_counter() - wall))
+    return {name: Time(*map(float, np.median(s, axis=0))) for name, s in samples.items()}, answers
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

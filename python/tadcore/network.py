@@ -202,6 +202,8 @@ def changes_of(
 
 def intervals_of(changes: Sequence[NetworkChange], end: float) -> tuple[Interval, ...]:
     """The stretches between changes, the last up to ``end``."""
+    if not changes:
+        return ()
     stretches: list[Interval] = []
     edges: set[Edge] = set()
     for change, until in zip(changes, [*(c.time for c in changes[1:]), end], strict=True):

@@ -94,8 +94,11 @@ class Run:
 
     @cached_property
     def network_changes(self) -> tuple[NetworkChange, ...]:
-        """(time, edges added, edges removed) wherever the network changes, the initial network first."""
-        in_force = max(len(self.times) - 1, 1)
+        """(time, edges added, edges removed) wherever the network changes, the initial network first.
+
+        Empty for a game that is over at t = 0: termination is tested before anyone looks around.
+        """
+        in_force = len(self.times) - 1
         return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
 
     def intervals(self) -> tuple[Interval, ...]:
@@ -116,7 +119,7 @@ class Run:
         save(self, folder)
 
     def __repr__(self) -> str:
-        changes = len(self.network_changes) - 1
+        changes = max(len(self.network_changes) - 1, 0)
         network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
         warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
         return f"Run({self.scenario.interaction}: {self.outcome}; {network}{warning})"

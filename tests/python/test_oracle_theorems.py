@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.stats import special_ortho_group
 
@@ -25,6 +25,11 @@ def drawn(seed, interaction, n, axes=2, **options):
     rng = np.random.default_rng(seed)
     game = random_game(rng, interaction, n, horizon=1.5, step=0.02, **options)
     return rng, game, random_start(rng, game, axes)
+
+
+def same_positions(one, other):
+    """Within 1e-8 of the extent: a pursuer that is not seen can run very far."""
+    return np.max(np.abs(one - other)) <= 1e-8 * (1 + np.max(np.abs(other)))
 
 
 def times(run):
@@ -82,11 +87,12 @@ def test_rotation_reflection_and_translation(seed, n, interaction, axes):
     moved = play(game, replace(start, positions=start.positions @ U.T + shift))
     assert times(moved) == times(run)
     assert moved.outcome == run.outcome
-    assert np.max(np.abs(moved.position - (run.position @ U.T + shift))) <= 1e-8
+    assert same_positions(moved.position, run.position @ U.T + shift)
     assert list(moved.costs.values()) == pytest.approx(list(run.costs.values()), rel=1e-8, abs=1e-10)
 
 
 @given(seed=SEEDS, n=st.integers(2, 4), interaction=st.sampled_from(["I1", "I2"]))
+@example(seed=42, n=4, interaction="I2")  # at step 35 one labelling alone makes the lower minimum easy to find
 def test_relabelled_defenders(seed, n, interaction):
     rng, game, start = drawn(seed, interaction, n)
     order = rng.permutation(n)
@@ -103,7 +109,7 @@ def test_relabelled_defenders(seed, n, interaction):
     if run.outcome.defender is not None:
         assert order[other.outcome.defender] == run.outcome.defender
     assert times(other) == times(run)
-    assert np.max(np.abs(other.position - run.position[:, players])) <= 1e-8
+    assert same_positions(other.position, run.position[:, players])
 
 
 @given(seed=SEEDS, n=st.integers(1, 3), interaction=st.sampled_from(["I1", "I2"]))
@@ -114,7 +120,7 @@ def test_a_planar_game_in_space(seed, n, interaction):
     run, space = play(game, start), play(game, replace(start, positions=start.positions @ plane.T + shift))
     assert space.outcome == run.outcome
     assert times(space) == times(run)
-    assert np.max(np.abs(space.position - (run.position @ plane.T + shift))) <= 1e-8
+    assert same_positions(space.position, run.position @ plane.T + shift)
 
 
 @given(seed=SEEDS, n=st.integers(1, 4), interaction=st.sampled_from(["I1", "I2"]))
@@ -140,7 +146,9 @@ def test_who_sees_nobody_stands_still(seed, n, interaction):
         assert not np.any(run.control[k][: game.m][alone])
     frozen = play(game, replace(start, zeta=np.full(game.m, 0.051), sigma=np.full(n + 1, 0.05)))
     if not frozen.adjacency[:-1].any() and len(frozen.times) > 1:
-        assert np.allclose(frozen.position[-1][: game.m], frozen.position[0][: game.m], rtol=0, atol=1e-12)
+        extent = 1 + np.max(np.abs(frozen.position))  # positions are kept relative to the attacker
+        drift = np.abs(frozen.position[-1][: game.m] - frozen.position[0][: game.m])
+        assert np.max(drift) <= 1e-12 * extent
 
 
 @pytest.mark.parametrize(("interaction", "order"), [("I1", 1), ("I2", 2)])

@@ -68,7 +68,7 @@ pub enum EquilibriumError {
     Cancelled(#[from] Cancelled),
 }
 
-/// The caller asked to stop, by the [`crate::cancel::CancelToken`] it passed.
+/// The caller asked to stop, by the cancel token it passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("cancelled by the caller")]
 pub struct Cancelled;

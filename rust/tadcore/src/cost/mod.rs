@@ -98,6 +98,10 @@ fn integrands(policy: &Policy, running: &[Vec<f64>], rows: &[f64], z: &[f64], di
     running.iter().zip(own).map(|(q, own)| weighted(q, z, dim) + own).collect()
 }
 
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
+}
+
 /// Coefficients of z(s h), s in [0, 1]: (C h)^j z / j!.
 fn expansion(c: &[f64], z: &[f64], size: usize, dim: usize, h: f64) -> Vec<Vec<f64>> {
     let mut series = vec![z.to_vec()];
@@ -107,7 +111,11 @@ fn expansion(c: &[f64], z: &[f64], size: usize, dim: usize, h: f64) -> Vec<Vec<f
             apply(row, &series[j - 1], dim, out);
         }
         term.iter_mut().for_each(|x| *x *= h / j as f64);
+        let done = largest(&term) <= 1e-18 * largest(z);
         series.push(term);
+        if done {
+            break;
+        }
     }
     series
 }

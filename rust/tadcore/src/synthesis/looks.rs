@@ -2,10 +2,11 @@
 //!
 //! 1. Newton from the canonical start. Most entries end here: the certificate of [`super::objective`] proves the
 //!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
-//! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a small
-//!    fixed second part B. Each descends without long jumps between basins and comes back to the real gains A, A + B
+//! 2. Otherwise a second look in complex gains, with a small and with a large second part B, and a third in stacked
+//!    gains, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins and comes back to the real gains A, A + B
 //!    and A − B, from where Newton finishes.
-//! 3. A last look from the best point with one row reversed at a time: GᵀRG does not see the sign of a row.
+//! 3. A last look from the best point with one row, or two, reversed: GᵀRG does not see the sign of a row, so minima
+//!    come in families that differ by signs. Then Newton once more from the canonical start without one row at a time.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
@@ -25,18 +26,20 @@ pub enum Look {
     Complex,
     /// The third look, in stacked gains.
     Stacked,
-    /// The last look, with a row reversed.
+    /// The last look, with rows reversed or left out.
     Reversed,
 }
 
-/// Size of the second part B at the start, relative to ‖F‖.
-const SECOND_PART: f64 = 0.1;
+/// Sizes of the second part B at the start, relative to ‖F‖: a small one, and one as large as the gains themselves.
+const FAR: [f64; 2] = [0.1, 1.0];
 /// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
 const LONGEST_STEP: f64 = 0.3;
 /// Relative gradient at which a second or third look has found its basin.
 const BASIN: f64 = 1e-6;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
+/// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
+const PAIRS_UP_TO: usize = 8;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 /// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
@@ -63,7 +66,6 @@ pub(super) struct Best {
 }
 
 /// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
-#[inline(always)]
 pub(super) fn search<const N: usize, const M: usize>(
     problem: &Problem,
     variables: &[Variable],
@@ -81,18 +83,22 @@ pub(super) fn search<const N: usize, const M: usize>(
     }
     let scales = (real.gradient_scale(&start), real.value_scale());
     let mut complex = ComplexGains::<N, M>::new(problem, scales);
-    look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
+    for far in FAR {
+        look(&mut complex, Look::Complex, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
+    }
     let mut stacked = RealGains::<N, M>::new(problem, 2);
-    look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    let (n, from) = (problem.size, g.to_vec());
-    for i in 0..problem.rows {
-        let row = i * n..(i + 1) * n;
-        if from[row.clone()].iter().all(|&x| x == 0.0) {
-            continue;
+    look(&mut stacked, Look::Stacked, FAR[0], problem, &mut real, variables, &start, g, &mut best, limits, s);
+    let from = g.to_vec();
+    let m = problem.rows;
+    for i in 0..m {
+        let partners = if m <= PAIRS_UP_TO { i..m } else { i..i + 1 };
+        for j in partners {
+            scale_rows(problem.size, &from, &[i, j], -1.0, &mut s.trial);
+            if s.trial != from {
+                finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
+            }
         }
-        s.trial.clear();
-        s.trial.extend_from_slice(&from);
-        s.trial[row].iter_mut().for_each(|x| *x = -*x);
+        scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
         finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
     }
     if best.look != Look::Canonical {
@@ -101,11 +107,21 @@ pub(super) fn search<const N: usize, const M: usize>(
     best
 }
 
+/// The gains with the named rows times `factor` (a row named twice once).
+fn scale_rows(n: usize, from: &[f64], rows: &[usize; 2], factor: f64, out: &mut Vec<f64>) {
+    out.clear();
+    out.extend_from_slice(from);
+    let distinct = if rows[0] == rows[1] { &rows[..1] } else { &rows[..] };
+    for &i in distinct {
+        out[i * n..(i + 1) * n].iter_mut().for_each(|x| *x *= factor);
+    }
+}
+
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
-#[inline(always)]
 fn look<const N: usize, const M: usize, O: Objective>(
     doubled: &mut O,
     name: Look,
+    far: f64,
     problem: &Problem,
     real: &mut RealGains<N, M>,
     variables: &[Variable],
@@ -119,7 +135,7 @@ fn look<const N: usize, const M: usize, O: Objective>(
     s.doubled.clear();
     s.doubled.extend_from_slice(variables);
     s.doubled.extend(variables.iter().map(|v| Variable { entry: v.entry + width, own: v.own + width, ..*v }));
-    let size = SECOND_PART * scale / (variables.len() as f64).sqrt();
+    let size = far * scale / (variables.len() as f64).sqrt();
     s.shift.clear();
     // A fixed pattern without symmetry; the golden angle spreads it.
     s.shift.extend((0..variables.len()).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()));
@@ -139,7 +155,6 @@ fn look<const N: usize, const M: usize, O: Objective>(
 }
 
 /// Newton from `s.trial`; keeps the point in `g` when it is lower.
-#[inline(always)]
 fn finish<const N: usize, const M: usize>(
     name: Look,
     real: &mut RealGains<N, M>,
@@ -159,7 +174,6 @@ fn finish<const N: usize, const M: usize>(
 }
 
 /// Whether the certificate proves the critical point `g` to be a global minimiser.
-#[inline(always)]
 pub(super) fn certify<const N: usize, const M: usize>(
     real: &mut RealGains<N, M>,
     g: &[f64],

@@ -92,7 +92,6 @@ const DAMPINGS: usize = 80;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
-#[inline(always)]
 pub(super) fn minimise<O: Objective>(
     objective: &mut O,
     g: &mut [f64],

@@ -1,0 +1,169 @@
+//! The paper's runs through the core alone, and what must hold of every run: work counts, batches, threads, budgets.
+
+use tadcore::cancel::CancelToken;
+use tadcore::cost;
+use tadcore::ensemble::{self, Batch};
+use tadcore::error::{Cancelled, RunError};
+use tadcore::game::bank::{self, Setup as Start};
+use tadcore::game::{Game, Interaction};
+use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
+use tadcore::simulation::{Outcome, Record, Setup, simulate};
+
+fn policy(game: Game, bytes: usize) -> Policy {
+    Policy::new(game, bytes, &CancelToken::new()).expect("an equilibrium")
+}
+
+fn paper(interaction: Interaction, lambda: f64) -> Policy {
+    policy(bank::paper_game(interaction, lambda).expect("valid"), DEFAULT_TABLE_BYTES)
+}
+
+fn run(policy: &Policy, start: &Start) -> Record {
+    let positions = start.positions.concat();
+    let setup = Setup { dim: 2, positions: &positions, visibility: &start.visibility, capture: &start.capture };
+    simulate(policy, &setup, &CancelToken::new()).expect("a run")
+}
+
+/// Grid indices at which the network differs from the one before.
+fn changes(record: &Record) -> Vec<usize> {
+    (1..record.steps).filter(|&k| record.networks[k] != record.networks[k - 1]).collect()
+}
+
+/// Section VI.1 of the paper, to the digit (δ = 0.005).
+#[test]
+fn the_first_interaction_comes_out_to_the_digit() {
+    let limited = bank::paper_i1_limited();
+    let full = Start { visibility: vec![f64::INFINITY; 3], ..limited.clone() };
+    let (evading, suicidal) = (paper(Interaction::I1, 1.0), paper(Interaction::I1, 0.0));
+    let captured = run(&evading, &full);
+    assert_eq!((captured.outcome, captured.steps), (Outcome::Captured, 532));
+    let intercepted = run(&evading, &limited);
+    assert_eq!((intercepted.outcome, intercepted.steps), (Outcome::Intercepted(0), 279));
+    assert_eq!(changes(&intercepted), [32, 98, 115, 183, 192]);
+    let second = run(&suicidal, &full);
+    assert_eq!((second.outcome, second.steps), (Outcome::Intercepted(1), 475));
+    let first = run(&suicidal, &limited);
+    assert_eq!((first.outcome, first.steps), (Outcome::Intercepted(0), 334));
+    assert_eq!(changes(&first), [34, 46, 97, 112, 174]);
+    assert!(first.controls.iter().chain(&first.positions).all(|x| x.is_finite()));
+}
+
+/// Section VI.2 with the printed parameters: what an independent implementation computed.
+#[test]
+fn the_second_interaction_comes_out_as_recomputed() {
+    let limited = bank::paper_i2_limited();
+    let policy = paper(Interaction::I2, 1.0);
+    let with = |visibility: [f64; 4]| run(&policy, &Start { visibility: visibility.to_vec(), ..limited.clone() });
+    let full = with([f64::INFINITY; 4]);
+    assert_eq!((full.outcome, full.steps), (Outcome::Intercepted(0), 655));
+    let far = with([5.0, 3.0, 0.3, 10.0]);
+    assert_eq!((far.outcome, far.steps), (Outcome::Captured, 785));
+    let near = with([5.0, 3.0, 0.3, 2.5]);
+    assert_eq!((near.outcome, near.steps), (Outcome::Intercepted(0), 708));
+    assert_eq!(changes(&near), [100, 201, 211, 262]);
+    let wide = with([5.0, 3.0, 0.6, 2.5]);
+    assert_eq!((wide.outcome, wide.steps), (Outcome::Intercepted(0), 699));
+    assert_eq!((0..wide.steps).find(|&k| (0..4).any(|j| wide.networks[k].sees(2, j))), Some(281));
+}
+
+/// Work counts guard speed on any machine.
+#[test]
+fn a_run_solves_each_step_once_and_a_second_run_solves_nothing() {
+    let policy = paper(Interaction::I1, 1.0);
+    let first = run(&policy, &bank::paper_i1_limited());
+    let stats = policy.table();
+    assert_eq!((stats.entries, stats.misses, stats.hits), (280, 280, 0));
+    assert_eq!(first.unconverged, 0);
+    assert!(first.iterations <= 1_300, "{} iterations", first.iterations);
+    let second = run(&policy, &bank::paper_i1_limited());
+    assert_eq!(policy.table().misses, 280);
+    assert_eq!(first, second);
+    assert_eq!(cost::costs(&policy, &first), cost::costs(&policy, &second));
+}
+
+/// With everyone in sight the zero-sum value is ½ z(0)ᵀP(0)z(0), and J of I1 is ½ z(0)ᵀP_p(0)z(0), when the game runs
+/// its full length.
+#[test]
+fn costs_are_the_value_functions_when_everyone_sees_everyone() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let game = bank::unit_game(interaction, vec![1.0, 0.7], 1.2, 0.8, 1.0, 1.0, 0.0005).expect("valid");
+        let policy = policy(game, DEFAULT_TABLE_BYTES);
+        let m = policy.game().constrained();
+        let start = Start {
+            positions: vec![vec![0.0, 0.0], vec![1.0, 1.5], vec![4.0, 1.0], vec![-4.0, 2.0]],
+            visibility: vec![f64::INFINITY; m],
+            capture: vec![1e-6; 3],
+        };
+        let record = run(&policy, &start);
+        assert_eq!(record.outcome, Outcome::Timeout);
+        let mut z = Vec::new();
+        tadcore::simulation::relative_state(&start.positions.concat(), 2, &mut z);
+        for (j, p) in cost::costs(&policy, &record).into_iter().zip(policy.equilibrium().node(0).chunks_exact(9)) {
+            let value: f64 =
+                (0..9).map(|e| p[e] * (0..2).map(|x| z[e / 3 * 2 + x] * z[e % 3 * 2 + x]).sum::<f64>()).sum();
+            // The sampled feedback is held over a step, so J differs from the value by O(δ).
+            assert!((j - 0.5 * value).abs() < 2e-3 * value.abs().max(1.0), "{interaction:?}: {j} {}", 0.5 * value);
+        }
+    }
+}
+
+fn lattice(trials: usize) -> Vec<f64> {
+    let mut state = 0.37_f64;
+    (0..trials * 10)
+        .map(|_| {
+            state = (state * 97.31 + 0.271).fract();
+            6.0 * state - 3.0
+        })
+        .collect()
+}
+
+#[test]
+fn batches_are_runs_whatever_the_threads_and_the_budget() {
+    let game = bank::unit_game(Interaction::I1, vec![1.0; 3], 1.2, 0.8, 1.0, 6.0, 0.02).expect("valid");
+    let start = bank::paper_i1_limited();
+    let positions = lattice(40);
+    let batch = Batch { dim: 2, positions: &positions, visibility: &start.visibility, capture: &start.capture };
+    let large = policy(game.clone(), DEFAULT_TABLE_BYTES);
+    let small = policy(game, 100_000);
+    let cancel = CancelToken::new();
+    let one = ensemble::run(&large, &batch, Some(1), &cancel).expect("a batch");
+    let two = ensemble::run(&large, &batch, Some(2), &cancel).expect("a batch");
+    let bounded = ensemble::run(&small, &batch, Some(2), &cancel).expect("a batch");
+    assert_eq!(one, two);
+    assert_eq!(one, bounded);
+    let stats = small.table();
+    assert!(stats.bytes <= 100_000 && stats.entries > 0, "{stats:?}");
+    for (i, &(outcome, steps)) in one.iter().enumerate() {
+        let setup = Setup {
+            dim: 2,
+            positions: &positions[i * 10..(i + 1) * 10],
+            visibility: &start.visibility,
+            capture: &start.capture,
+        };
+        let record = simulate(&large, &setup, &cancel).expect("a run");
+        assert_eq!((record.outcome, record.steps), (outcome, steps), "trial {i}");
+    }
+    let kinds: std::collections::HashSet<i8> = one.iter().map(|(o, _)| o.code()).collect();
+    assert!(kinds.len() >= 2, "the sample should end in more than one way");
+}
+
+#[test]
+fn a_bad_row_is_refused_before_anything_runs_and_a_raised_token_stops() {
+    let policy = paper(Interaction::I1, 1.0);
+    let start = bank::paper_i1_limited();
+    let batch = |row: [f64; 30]| {
+        let batch = Batch { dim: 2, positions: &row, visibility: &start.visibility, capture: &start.capture };
+        let token = CancelToken::new();
+        token.cancel();
+        (ensemble::run(&policy, &batch, Some(1), &CancelToken::new()), ensemble::run(&policy, &batch, Some(1), &token))
+    };
+    let mut row = [0.0; 30];
+    row.copy_from_slice(&lattice(3));
+    row[25] = f64::NAN;
+    let (refused, _) = batch(row);
+    assert!(matches!(refused, Err(RunError::Game(_))), "{refused:?}");
+    assert_eq!(policy.table().misses, 0);
+    row[25] = 0.0;
+    let (done, cancelled) = batch(row);
+    assert_eq!(done.map(|ends| ends.len()), Ok(3));
+    assert_eq!(cancelled, Err(RunError::Cancelled(Cancelled)));
+}
