@@ -1,28 +1,23 @@
 //! Interaction I1: dP_p/ds = Q_p − P_p A − Aᵀ P_p + P_p S_p P_p for p = d, τ, a, from P_p = F_p at s = T − t = 0.
 //!
 //! With S_d = diag(1/r_d, 0), S_τ = e_N e_Nᵀ / r_τ and S_a = 1 1ᵀ / r_a, the matrix A = S_d P_d + S_τ P_τ + S_a P_a is a
-//! row scaling plus two rank-one terms, and the equation is dP_p/ds = Q_p + G_p + G_pᵀ with
+//! row scaling plus two rank-one terms, and the equation is dP_p/ds = Q_p − G_p − G_pᵀ with
 //!
-//! G_p = ½ P_p S_p P_p − P_p A = −c_p P_p (S_d P_d) − u_p tᵀ / r_τ − v_p aᵀ / r_a,   t = P_τ e_N,   a = P_a 1,
+//! G_p = P_p A − ½ P_p S_p P_p = c_p P_p (S_d P_d) + u_p tᵀ / r_τ + v_p aᵀ / r_a,   t = P_τ e_N,   a = P_a 1,
 //!
-//! u_p = P_p e_N and v_p = P_p 1, but u_τ = t/2, v_a = a/2 and c_d = ½ instead of 1: three products with N + 1 inner
-//! terms. Both sums of a pair (i, j), (j, i) are the same number, so P_p stays symmetric to the bit: the rounding
-//! asymmetry that the unsymmetrised form lets grow over the horizon cannot arise.
+//! u_p = P_p e_N and v_p = P_p 1, but u_τ = t/2, v_a = a/2 and c_d = ½ instead of 1. This costs three products with n
+//! inner terms, and as every operation is the same for the entries (i, j) and (j, i), P_p stays symmetric to the bit:
+//! the rounding asymmetry that the unsymmetrised form lets grow over the horizon cannot arise.
 //!
 //! | symbol | name here | meaning |
 //! |---|---|---|
 //! | P_d, P_τ, P_a | blocks 0, 1, 2 of `y` | reduced factors, N × N in rows of `l` entries |
 //! | Q_p | `q` | running weights, diagonal |
-//! | −S_d P_d, −tᵀ/r_τ, −aᵀ/r_a | `right` | N + 1 rows, in strips of W columns |
-//! | c_p P_p, u_p, v_p | `left` | N + 1 columns, in panels of R rows |
+//! | S_d P_d | `m` | its n nonzero rows, in strips of W columns |
 //! | G_p | `g` | see above |
 //!
-//! Up to N = 12 the size is a constant of the compiler; above, the same code runs with the size as a variable, in rows
-//! padded to whole strips of 8. At N = 11 the constant saves a third of the instructions (81 to 56 million for the
-//! 1,201 nodes of the paper's grid), mostly padding. The products are plain loops in both: at 96 × 32 × 32, which is
-//! N = 31 and 32, `faer` needs 4.5 µs where they need 5.5, but by fused operations, hence with other bits on other
-//! machines; at N = 4 and 8 three products of `nalgebra` take 0.04 and 0.24 µs, of a right-hand side of 0.1 and 0.5.
-//! Whole solve on one core at 3 GHz, in CPU time: n = 3 in 0.4 ms, n = 10 in 5.7 ms, n = 30 in 82 ms.
+//! Up to N = 8 the size is a constant of the compiler, and the product of one row is held in registers; above, rows
+//! are padded to whole strips and the same code runs with the size as a variable.
 //!
 //! Source: eq:Riccati of the paper, with the sign of time reversed.
 
@@ -45,9 +40,10 @@ struct Coupled {
     minus_inv_rd: Vec<f64>,
     minus_inv_rtau: f64,
     minus_inv_ra: f64,
-    right: Vec<f64>,
-    left: Vec<f64>,
+    m: Vec<f64>,
     g: Vec<f64>,
+    t: Vec<f64>,
+    a: Vec<f64>,
     v: Vec<f64>,
 }
 
@@ -65,9 +61,10 @@ impl Coupled {
             minus_inv_rd: w.r_d.iter().map(|r| -1.0 / r).collect(),
             minus_inv_rtau: -1.0 / w.r_tau,
             minus_inv_ra: -1.0 / w.r_a,
-            right: vec![0.0; (n + 1) * l],
-            left: vec![0.0; (n + 1) * rows],
+            m: vec![0.0; n * l],
             g: vec![0.0; rows * l],
+            t: vec![0.0; l],
+            a: vec![0.0; l],
             v: vec![0.0; l],
         }
     }
@@ -95,39 +92,42 @@ impl Coupled {
     ) {
         let rows = n.next_multiple_of(R).next_multiple_of(B);
         let (block, defenders, strips) = (self.block, n - 1, l / W);
-        let inner = n + 1;
-        let right = self.right[..inner * l].as_chunks_mut::<W>().0;
-        let left = self.left[..rows * inner].as_chunks_mut::<R>().0;
+        let m = self.m[..defenders * l].as_chunks_mut::<W>().0;
         let g = self.g[..rows * l].as_chunks_mut::<W>().0;
+        let t = self.t[..l].as_chunks_mut::<W>().0;
+        let a = self.a[..l].as_chunks_mut::<W>().0;
         let v = &mut self.v[..l];
         let p: [&[f64]; 3] = std::array::from_fn(|p| &y[p * block..p * block + rows * l]);
-        // The rows of −S_d P_d, then −tᵀ / r_τ and −aᵀ / r_a, strip by strip.
-        row_sums::<W>(&p[2][..n * l], v.as_chunks_mut::<W>().0);
-        for (s, strip) in right.chunks_exact_mut(inner).enumerate() {
-            let (p_d, p_tau) = (p[0].as_chunks::<W>().0, p[1].as_chunks::<W>().0);
-            for k in 0..defenders {
-                strip[k] = p_d[k * strips + s].map(|x| x * self.minus_inv_rd[k]);
+        // −tᵀ / r_τ and −aᵀ / r_a
+        for (t, p) in t.iter_mut().zip(p[1][defenders * l..n * l].as_chunks::<W>().0) {
+            *t = p.map(|x| x * self.minus_inv_rtau);
+        }
+        row_sums::<W>(&p[2][..n * l], a);
+        for a in a.iter_mut() {
+            *a = a.map(|x| x * self.minus_inv_ra);
+        }
+        // −S_d P_d, strip by strip
+        for k in 0..defenders {
+            for s in 0..strips {
+                m[s * defenders + k] = p[0].as_chunks::<W>().0[k * strips + s].map(|x| x * self.minus_inv_rd[k]);
             }
-            strip[defenders] = p_tau[defenders * strips + s].map(|x| x * self.minus_inv_rtau);
-            strip[n] = v.as_chunks::<W>().0[s].map(|x| x * self.minus_inv_ra);
         }
         for (own, matrix) in p.into_iter().enumerate() {
-            // The columns of P_p, u and v, R rows at a time: a column of a symmetric matrix is its row.
             row_sums::<W>(&matrix[..n * l], v.as_chunks_mut::<W>().0);
             let half = |p: usize| if p == own { 0.5 } else { 1.0 };
-            for (i, panel) in left.chunks_exact_mut(inner).enumerate() {
-                for k in 0..defenders {
-                    panel[k] = scaled(&matrix[k * l + i * R..k * l + (i + 1) * R], half(0));
-                }
-                panel[defenders] = scaled(&matrix[defenders * l + i * R..defenders * l + (i + 1) * R], half(1));
-                panel[n] = scaled(&v[i * R..(i + 1) * R], half(2));
-            }
-            for (s, strip) in right.chunks_exact(inner).enumerate() {
-                for (i, panel) in left.chunks_exact(inner).enumerate() {
-                    let tile = product(panel, strip);
+            let (half_d, half_tau, half_a) = (half(0), half(1), half(2));
+            let u = &matrix[defenders * l..n * l];
+            for s in 0..strips {
+                let m = &m[s * defenders..(s + 1) * defenders];
+                let (t, a) = (&t[s], &a[s]);
+                let mut i = 0;
+                while i < n {
+                    let sum = tile::<W, R>(&matrix[..defenders * l], l, i, m);
                     for r in 0..R {
-                        g[(i * R + r) * strips + s] = tile[r];
+                        let (u, v) = (half_tau * u[i + r], half_a * v[i + r]);
+                        g[(i + r) * strips + s] = std::array::from_fn(|c| half_d * sum[r][c] + (u * t[c] + v * a[c]));
                     }
+                    i += R;
                 }
             }
             let out = &mut dy[own * block..own * block + rows * l];
@@ -139,19 +139,16 @@ impl Coupled {
     }
 }
 
+/// R rows, from row i, of a product of a symmetric matrix (its first rows) with a strip of W columns.
 #[inline(always)]
-fn scaled<const R: usize>(v: &[f64], factor: f64) -> [f64; R] {
-    std::array::from_fn(|r| factor * v[r])
-}
-
-/// Σ_k left_k right_kᵀ: R rows and W columns of a product.
-#[inline(always)]
-fn product<const W: usize, const R: usize>(left: &[[f64; R]], right: &[[f64; W]]) -> [[f64; W]; R] {
+fn tile<const W: usize, const R: usize>(p: &[f64], l: usize, i: usize, strip: &[[f64; W]]) -> [[f64; W]; R] {
     let mut sum = [[0.0; W]; R];
-    for (left, right) in left.iter().zip(right) {
+    for (row, m) in p.chunks_exact(l).zip(strip) {
+        // A column of a symmetric matrix is its row, where the entries for R rows lie together.
+        let left = &row[i..i + R];
         for r in 0..R {
             for c in 0..W {
-                sum[r][c] += left[r] * right[c];
+                sum[r][c] += left[r] * m[c];
             }
         }
     }
@@ -161,15 +158,16 @@ fn product<const W: usize, const R: usize>(left: &[[f64; R]], right: &[[f64; W]]
 /// P 1, as the sum of the rows of a symmetric P.
 #[inline(always)]
 fn row_sums<const W: usize>(p: &[f64], out: &mut [[f64; W]]) {
-    let strips = out.len();
-    for (s, out) in out.iter_mut().enumerate() {
-        let mut sum = [0.0; W];
-        for row in p.as_chunks::<W>().0.chunks_exact(strips) {
+    let mut rows = p.as_chunks::<W>().0.chunks_exact(out.len());
+    if let Some(first) = rows.next() {
+        out.copy_from_slice(first);
+    }
+    for row in rows {
+        for (o, x) in out.iter_mut().zip(row) {
             for c in 0..W {
-                sum[c] += row[s][c];
+                o[c] += x[c];
             }
         }
-        *out = sum;
     }
 }
 
@@ -260,10 +258,6 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         6 => small!(6, 8, 6, 2),
         7 => small!(7, 8, 4, 4),
         8 => small!(8, 8, 4, 4),
-        9 => small!(9, 12, 3, 4),
-        10 => small!(10, 12, 2, 4),
-        11 => small!(11, 12, 4, 4),
-        12 => small!(12, 12, 4, 4),
         _ => {
             let l = n.next_multiple_of(STRIP);
             let core = Coupled::new(game, l, n.next_multiple_of(TILE).next_multiple_of(4));

@@ -114,32 +114,24 @@ widened! {
 }
 
 widened! {
-    /// The weighted error estimates w e5 and w e3 of every entry; `out` holds w, then w e5, then w e3.
+    /// Σ (w e5)² and Σ (w e3)² over the block of entries from `start`.
     #[inline(never)]
-    pub(super) fn errors(out: &mut [f64], k: &[f64]) {
-        let len = out.len() / 3;
-        let (weight, rest) = out.split_at_mut(len);
-        let (five, three) = rest.split_at_mut(len);
-        let (weight, five, three) = (&weight[..len], &mut five[..len], &mut three[..len]);
-        let (k5, k3) = (stages(k, len, &t::E5), stages(k, len, &t::E3));
-        for i in 0..len {
-            five[i] = weight[i] * sum(&k5, &t::E5, i);
+    pub(super) fn error_sums(k: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64) {
+        let len = weight.len();
+        let k5 = stages(k, len, &t::E5).map(|k| &k[start..][..block]);
+        let k3 = stages(k, len, &t::E3).map(|k| &k[start..][..block]);
+        let weight = &weight[start..][..block];
+        let (mut five, mut three) = ([0.0; LANES], [0.0; LANES]);
+        for c in 0..block / LANES {
+            for i in 0..LANES {
+                let at = c * LANES + i;
+                let (e5, e3) = (weight[at] * sum(&k5, &t::E5, at), weight[at] * sum(&k3, &t::E3, at));
+                five[i] += e5 * e5;
+                three[i] += e3 * e3;
+            }
         }
-        for i in 0..len {
-            three[i] = weight[i] * sum(&k3, &t::E3, i);
-        }
+        (five.iter().sum(), three.iter().sum())
     }
-}
-
-/// Σ v², in [`LANES`] partial sums.
-pub(super) fn square(v: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    for v in v.as_chunks::<LANES>().0 {
-        for i in 0..LANES {
-            sums[i] += v[i] * v[i];
-        }
-    }
-    sums.iter().sum()
 }
 
 widened! {
@@ -184,7 +176,7 @@ widened! {
     pub(super) fn interpolate(out: &mut [f64], y: &[f64], dense: &[f64], theta: f64) {
         let mut weight = 1.0;
         let row: [(usize, f64); DENSE] = std::array::from_fn(|j| {
-            weight *= if j.is_multiple_of(2) { theta } else { 1.0 - theta };
+            weight *= if j % 2 == 0 { theta } else { 1.0 - theta };
             (j, weight)
         });
         step(out, y, dense, &row, 1.0);
