@@ -82,6 +82,9 @@ pub enum RunError {
     /// No equilibrium.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
+    /// The system gave no threads.
+    #[error("threads is {0}, but the system would not start that many")]
+    Threads(usize),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

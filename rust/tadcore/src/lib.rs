@@ -15,6 +15,7 @@
 //! | layer | what it knows |
 //! |---|---|
 //! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
+//! | `width` | loops compiled for each vector width |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
 //! | [`network`] | who sees whom; what each player may use |
@@ -45,3 +46,4 @@ pub mod policy;
 pub mod riccati;
 pub mod simulation;
 pub mod synthesis;
+mod width;

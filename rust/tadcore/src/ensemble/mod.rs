@@ -1,5 +1,20 @@
-//! Many games of one policy, outcomes only.
-mod play;
+//! Many games of one policy, outcomes only, in lockstep.
+//!
+//! The trials are cut into chunks of at most [`CHUNK`]; a chunk's states fit the second cache, and at each instant the
+//! part of the table in use fits the first. Chunks are played by a pool of threads made for the call; what a trial does
+//! depends on its own row and on nothing else, so the outcomes are the same bits for any number of threads and any way
+//! of cutting.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | X(0) | [`Batch::positions`] | initial positions |
+//! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
+//! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
+
+mod chunk;
+mod strip;
+
+use std::thread::available_parallelism;
 
 use rayon::prelude::*;
 
@@ -7,7 +22,10 @@ use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::policy::Policy;
 use crate::simulation::{Outcome, Setup};
-use crate::synthesis::Synthesizer;
+use chunk::{Chunk, Worker};
+
+/// Trials of one chunk at most.
+pub const CHUNK: usize = 4096;
 
 /// Positions and radii of M games; radii are M rows, or one row shared by all.
 #[derive(Debug, Clone, Copy)]
@@ -29,22 +47,34 @@ impl Batch<'_> {
         self.positions.len() / (players * self.dim)
     }
 
+    fn position(&self, i: usize, players: usize) -> &[f64] {
+        &self.positions[i * players * self.dim..(i + 1) * players * self.dim]
+    }
+
+    fn capture_row(&self, i: usize, width: usize) -> &[f64] {
+        row(self.capture, width, i)
+    }
+
     fn setup(&self, i: usize, n: usize, m: usize) -> Setup<'_> {
-        let row = |all: &'_ [f64], width: usize, i: usize| -> std::ops::Range<usize> {
-            let i = if all.len() == width { 0 } else { i };
-            i * width..(i + 1) * width
-        };
-        let width = (n + 2) * self.dim;
         Setup {
             dim: self.dim,
-            positions: &self.positions[i * width..(i + 1) * width],
-            visibility: &self.visibility[row(self.visibility, m, i)],
-            capture: &self.capture[row(self.capture, n + 1, i)],
+            positions: self.position(i, n + 2),
+            visibility: row(self.visibility, m, i),
+            capture: self.capture_row(i, n + 1),
         }
     }
 }
 
+/// Row i of `all`, or its only row.
+fn row(all: &[f64], width: usize, i: usize) -> &[f64] {
+    let i = if all.len() == width { 0 } else { i };
+    &all[i * width..(i + 1) * width]
+}
+
 /// Plays every game of `batch`; outcomes and final grid indices in order.
+///
+/// # Errors
+/// [`RunError`] for the first row that breaks a rule, before anything is played, or when the caller cancelled.
 pub fn run(
     policy: &Policy,
     batch: &Batch,
@@ -56,12 +86,22 @@ pub fn run(
     for i in 0..trials {
         batch.setup(i, n, m).check(policy.game())?;
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    let Ok(pool) = pool else { return Err(RunError::Cancelled(crate::error::Cancelled)) };
+    let mut ends = vec![(Outcome::Timeout, 0); trials];
+    let threads = threads.filter(|&t| t > 0).unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+    let size = trials.div_ceil(threads).clamp(1, CHUNK);
+    if threads == 1 || trials <= size {
+        let mut worker = Worker::new(policy);
+        for (c, ends) in ends.chunks_mut(size).enumerate() {
+            Chunk::new(policy, batch, c * size, ends.len()).play(ends, &mut worker, cancel)?;
+        }
+        return Ok(ends);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|_| RunError::Threads(threads))?;
     pool.install(|| {
-        (0..trials)
-            .into_par_iter()
-            .map_init(Synthesizer::new, |solver, i| Ok(play::play(policy, &batch.setup(i, n, m), solver, cancel)?))
-            .collect()
-    })
+        ends.par_chunks_mut(size).enumerate().try_for_each_init(
+            || Worker::new(policy),
+            |worker, (c, ends)| Chunk::new(policy, batch, c * size, ends.len()).play(ends, worker, cancel),
+        )
+    })?;
+    Ok(ends)
 }

@@ -54,6 +54,20 @@ impl Topology {
         Self { rows, size, words: Words::Inline(key) }
     }
 
+    /// The network with the bits of `words`, 64 a word.
+    ///
+    /// # Panics
+    /// When `words` is not as long as [`Topology::words`] of that size (a programming error).
+    #[must_use]
+    pub fn from_words(rows: usize, size: usize, words: &[u64]) -> Self {
+        let mut topology = Self::empty(rows, size);
+        match &mut topology.words {
+            Words::Inline(word) => *word = words[0],
+            Words::Heap(held) => held.copy_from_slice(words),
+        }
+        topology
+    }
+
     /// The bits as one number, when there are at most 64.
     #[must_use]
     pub fn key(&self) -> Option<u64> {

@@ -9,11 +9,15 @@
 //! A [`Policy`] owns the game, its equilibrium and the table of everything computed so far; it is shared, by reference,
 //! between all runs of the game, whatever their positions and radii.
 
+mod budget;
 pub mod closed_loop;
 pub mod exponential;
+pub(crate) mod shelf;
 mod table;
+pub(crate) mod transitions;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 pub use table::{DEFAULT_TABLE_BYTES, TableStats};
 
@@ -23,7 +27,9 @@ use crate::game::Game;
 use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
+use budget::Budget;
 use table::Table;
+use transitions::Transitions;
 
 /// The answer at one (step, topology).
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +53,9 @@ impl StepPolicy {
 pub struct Policy {
     game: Game,
     equilibrium: Equilibrium,
+    budget: Budget,
     table: Table,
+    transitions: Transitions,
 }
 
 impl Policy {
@@ -57,8 +65,10 @@ impl Policy {
     /// [`EquilibriumError`] when the game has no equilibrium on [0, T], or the caller cancelled.
     pub fn new(game: Game, table_bytes: usize, cancel: &CancelToken) -> Result<Self, EquilibriumError> {
         let equilibrium = riccati::solve(&game, cancel)?;
-        let table = Table::new(game.grid().steps() + 1, table_bytes);
-        Ok(Self { game, equilibrium, table })
+        let steps = game.grid().steps();
+        let (table, budget) = (Table::new(steps + 1), Budget::new(table_bytes));
+        let transitions = Transitions::new(steps, game.constrained(), game.size());
+        Ok(Self { game, equilibrium, budget, table, transitions })
     }
 
     /// The game.
@@ -73,10 +83,23 @@ impl Policy {
         &self.equilibrium
     }
 
-    /// What the table has done so far.
+    /// What the tables have done so far: the answers kept for recorded runs and the transitions of ensembles.
     #[must_use]
     pub fn table(&self) -> TableStats {
-        self.table.stats()
+        let transitions = &self.transitions;
+        let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        TableStats {
+            entries: self.table.entries() + transitions.entries.load(Ordering::Relaxed),
+            hits: load(&self.table.hits) + load(&transitions.hits),
+            misses: load(&self.table.misses) + load(&transitions.misses),
+            bytes: self.budget.used(),
+            capacity: self.budget.capacity(),
+        }
+    }
+
+    /// The transitions, for ensembles.
+    pub(crate) fn transitions(&self) -> &Transitions {
+        &self.transitions
     }
 
     /// The synthesis problem at t_k.
@@ -98,7 +121,7 @@ impl Policy {
             return found;
         }
         let entry = Arc::new(self.solve(step, topology, solver));
-        self.table.keep(step, topology, &entry);
+        self.table.keep(step, topology, &entry, &self.budget);
         entry
     }
 

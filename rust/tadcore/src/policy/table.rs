@@ -1,4 +1,4 @@
-//! The (step, topology) table: every answer of the policy, computed once and shared by all runs of a game.
+//! The answers of the policy by step and topology, gains and all: what recorded runs read, computed once.
 //!
 //! One shelf per grid instant behind its own lock, so that threads at different instants never meet. What is stored is a
 //! function of (step, topology) alone: it does not matter who computes an entry, nor whether it is kept. Past the byte
@@ -9,9 +9,10 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use super::StepPolicy;
+use super::budget::Budget;
 use crate::network::Topology;
 
-/// Bytes a table may hold unless told otherwise: 512 MiB, some four million entries at n = 3.
+/// Bytes the tables of a game may hold unless told otherwise: 512 MiB, some two million transitions at n = 3.
 pub const DEFAULT_TABLE_BYTES: usize = 512 << 20;
 
 /// What a table has done so far.
@@ -35,19 +36,15 @@ type Shelf = RwLock<HashMap<Topology, Arc<StepPolicy>>>;
 #[derive(Debug)]
 pub(super) struct Table {
     shelves: Vec<Shelf>,
-    capacity: usize,
-    bytes: AtomicUsize,
     entries: AtomicUsize,
-    hits: AtomicU64,
-    misses: AtomicU64,
+    pub(super) hits: AtomicU64,
+    pub(super) misses: AtomicU64,
 }
 
 impl Table {
-    pub(super) fn new(instants: usize, capacity: usize) -> Self {
+    pub(super) fn new(instants: usize) -> Self {
         Self {
             shelves: (0..instants).map(|_| Shelf::default()).collect(),
-            capacity,
-            bytes: AtomicUsize::new(0),
             entries: AtomicUsize::new(0),
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
@@ -56,35 +53,32 @@ impl Table {
 
     /// The entry, if it is held.
     pub(super) fn get(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
-        let shelf = self.shelves[step].read().unwrap_or_else(PoisonError::into_inner);
-        let found = shelf.get(topology).cloned();
+        let found = self.peek(step, topology);
         let counter = if found.is_some() { &self.hits } else { &self.misses };
         counter.fetch_add(1, Ordering::Relaxed);
         found
     }
 
+    /// The entry, if it is held, without counting.
+    pub(super) fn peek(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
+        self.shelves[step].read().unwrap_or_else(PoisonError::into_inner).get(topology).cloned()
+    }
+
     /// Keeps the entry if the budget allows.
-    pub(super) fn keep(&self, step: usize, topology: &Topology, entry: &Arc<StepPolicy>) {
+    pub(super) fn keep(&self, step: usize, topology: &Topology, entry: &Arc<StepPolicy>, budget: &Budget) {
         let size = entry.bytes() + size_of_val(topology.words()) + size_of::<Topology>();
-        if self.bytes.fetch_add(size, Ordering::Relaxed) + size > self.capacity {
-            self.bytes.fetch_sub(size, Ordering::Relaxed);
+        if !budget.take(size) {
             return;
         }
         let mut shelf = self.shelves[step].write().unwrap_or_else(PoisonError::into_inner);
         if shelf.insert(topology.clone(), Arc::clone(entry)).is_some() {
-            self.bytes.fetch_sub(size, Ordering::Relaxed);
+            budget.give(size);
         } else {
             self.entries.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    pub(super) fn stats(&self) -> TableStats {
-        TableStats {
-            entries: self.entries.load(Ordering::Relaxed),
-            hits: self.hits.load(Ordering::Relaxed),
-            misses: self.misses.load(Ordering::Relaxed),
-            bytes: self.bytes.load(Ordering::Relaxed),
-            capacity: self.capacity,
-        }
+    pub(super) fn entries(&self) -> usize {
+        self.entries.load(Ordering::Relaxed)
     }
 }

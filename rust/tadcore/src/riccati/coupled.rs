@@ -22,10 +22,11 @@
 //! Source: eq:Riccati of the paper, with the sign of time reversed.
 
 use super::dop853::{self, Flow};
-use super::lanes::{LANES, Width, widened};
+use super::lanes::LANES;
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
+use crate::width::{Width, widened};
 
 /// Local error per step, in the weighted norm of [`dop853`]. Over random games this keeps every node to 3e-12 (weights
 /// within two orders of magnitude) or to what the conditioning of the game allows.

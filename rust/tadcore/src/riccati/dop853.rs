@@ -20,9 +20,10 @@
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4 to II.6.
 
 use super::escape;
-use super::lanes::{self, DENSE, STAGES, Width};
+use super::lanes::{self, DENSE, STAGES};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
+use crate::width::Width;
 
 /// Attempted steps after which the integrator gives up. A game that needs more is stiff (a rate some 10⁶ times the
 /// inverse of the horizon), not escaping; ordinary games take some hundred steps, the wildest seen 10⁴.

@@ -23,10 +23,10 @@
 //! Source: eq:RDE of the paper, with the sign of time reversed; the bound is ours.
 
 use super::escape;
-use super::lanes::{Width, widened};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
+use crate::width::{Width, widened};
 
 /// Largest bound on ‖X − I‖ for which a step is taken.
 const BOUND: f64 = 0.5;

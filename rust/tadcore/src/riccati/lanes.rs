@@ -1,8 +1,4 @@
-//! out = base + h Σ_j a_j k_j: the loops over the state, in whole vector lanes.
-//!
-//! Each loop is compiled
-//! twice, for the baseline of the target and for AVX2, and the processor decides at run time. Only the width differs:
-//! the operations and their order are the same and none is fused, so both give the same bits.
+//! out = base + h Σ_j a_j k_j: the loops over the state, in whole vector lanes, at the processor's [`crate::width`].
 //!
 //! | symbol | name here | meaning |
 //! |---|---|---|
@@ -12,6 +8,7 @@
 //! Source: the method of `dop853`; the layout is ours, by measurement.
 
 use super::tableau as t;
+use crate::width::widened;
 
 /// Entries handled together.
 pub(super) const LANES: usize = 8;
@@ -19,50 +16,6 @@ pub(super) const LANES: usize = 8;
 pub(super) const STAGES: usize = 16;
 /// Coefficients of the dense output.
 pub(super) const DENSE: usize = 7;
-
-/// Which instructions the processor has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Width {
-    /// Whatever the target guarantees.
-    Baseline,
-    /// 256 bits; only made by [`Width::detect`] after asking the processor.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-}
-
-impl Width {
-    /// Asks the processor.
-    pub(super) fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
-        }
-        Self::Baseline
-    }
-}
-
-/// Defines a function by a body compiled for every [`Width`].
-macro_rules! widened {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
-        $(#[$doc])*
-        $vis fn $name $(<$(const $g: usize),*>)? (width: $crate::riccati::lanes::Width, $($arg: $ty),*) $(-> $ret)? {
-            #[inline(always)]
-            fn body $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? $body
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
-                body $(::<$($g),*>)? ($($arg),*)
-            }
-            match width {
-                $crate::riccati::lanes::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
-                // SAFETY: this variant exists only where the processor said that it has AVX2.
-                #[cfg(target_arch = "x86_64")]
-                $crate::riccati::lanes::Width::Avx2 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
-            }
-        }
-    };
-}
-pub(super) use widened;
 
 /// The stages that a row of the tableau uses, cut to the length of the state.
 #[inline(always)]

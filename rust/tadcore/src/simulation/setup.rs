@@ -35,18 +35,19 @@ impl Setup<'_> {
                 return Err(GameError::Length { field, found, expected });
             }
         }
-        for (e, &x) in self.positions.iter().enumerate() {
-            rule(&format!("positions[{}, {}]", e / self.dim, e % self.dim), x, x.is_finite(), "a finite number")?;
+        // A name is put together only for a number that breaks its rule: this runs for every trial of an ensemble.
+        if let Some(e) = self.positions.iter().position(|x| !x.is_finite()) {
+            let field = format!("positions[{}, {}]", e / self.dim, e % self.dim);
+            rule(&field, self.positions[e], false, "a finite number")?;
         }
-        for (i, &zeta) in self.visibility.iter().enumerate() {
-            rule(&format!("visibility_radii[{i}]"), zeta, zeta > 0.0, "a positive number or infinity")?;
+        if let Some(i) = self.visibility.iter().position(|&zeta| zeta.is_nan() || zeta <= 0.0) {
+            rule(&format!("visibility_radii[{i}]"), self.visibility[i], false, "a positive number or infinity")?;
         }
-        for (i, &sigma) in self.capture.iter().enumerate() {
-            positive(&format!("capture_radii[{i}]"), sigma)?;
-            if i < n {
-                let below = sigma < self.visibility[i];
-                rule(&format!("capture_radii[{i}]"), sigma, below, "smaller than the visibility radius")?;
-            }
+        if let Some(i) = self.capture.iter().position(|&sigma| !(sigma > 0.0 && sigma.is_finite())) {
+            positive(&format!("capture_radii[{i}]"), self.capture[i])?;
+        }
+        if let Some(i) = (0..n).find(|&i| self.capture[i] >= self.visibility[i]) {
+            rule(&format!("capture_radii[{i}]"), self.capture[i], false, "smaller than the visibility radius")?;
         }
         Ok(())
     }

@@ -1,0 +1,229 @@
+//! A chunk of trials in lockstep: all that still play stand at the same grid instant.
+//!
+//! At every instant the strips of the chunk move one after another. A trial that is over leaves: the last one takes its
+//! place, so the strips stay full. A strip whose topologies are not all on the shelf waits; when the others have moved,
+//! what is missing is solved and the waiting strips follow.
+
+use std::sync::RwLockReadGuard;
+
+use super::Batch;
+use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, sweep_of};
+use crate::cancel::CancelToken;
+use crate::error::Cancelled;
+use crate::network::{Topology, squared_reach};
+use crate::policy::Policy;
+use crate::policy::shelf::Shelf;
+use crate::policy::transitions::Filler;
+use crate::simulation::{Outcome, Reach};
+use crate::width::Width;
+
+/// How one trial ended, and the grid index of its end.
+pub(super) type End = (Outcome, usize);
+
+/// The scratch of one worker, reused from chunk to chunk.
+#[derive(Debug)]
+pub(super) struct Worker {
+    width: Width,
+    filler: Filler,
+    local: Shelf,
+    keys: Keys,
+    missing: Vec<Topology>,
+    waiting: Vec<usize>,
+}
+
+impl Worker {
+    pub(super) fn new(policy: &Policy) -> Self {
+        let (rows, size) = (policy.game().constrained(), policy.game().size());
+        Self {
+            width: Width::detect(),
+            filler: Filler::default(),
+            local: Shelf::new(rows, size),
+            keys: vec![[0; LANES]; (rows * size).div_ceil(64)],
+            missing: Vec::new(),
+            waiting: Vec::new(),
+        }
+    }
+}
+
+/// Trials `first..first + ends.len()` of a batch.
+pub(super) struct Chunk<'a> {
+    policy: &'a Policy,
+    batch: &'a Batch<'a>,
+    first: usize,
+    shape: Shape,
+    sweep: Sweep,
+    strips: Strips,
+    /// Which trial of the chunk stands in each place.
+    who: Vec<u32>,
+}
+
+impl<'a> Chunk<'a> {
+    /// The trials from `first` on at their initial positions.
+    pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize) -> Self {
+        let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
+        let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
+        let strips = trials.div_ceil(LANES);
+        let mut z = vec![[0.0; LANES]; strips * size * dim];
+        for place in 0..strips * LANES {
+            // Places past the last trial repeat the first of their strip, so that they ask for nothing new.
+            let trial = if place < trials { place } else { place / LANES * LANES };
+            let row = batch.position(first + trial, size + 1);
+            let (players, attacker) = row.split_at(size * dim);
+            let lanes = &mut z[place / LANES * size * dim..][..size * dim];
+            for (e, (lane, x)) in lanes.iter_mut().zip(players).enumerate() {
+                lane[place % LANES] = x - attacker[e % dim];
+            }
+        }
+        let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
+        let (capture, capture_step) = reaches(batch.capture, size, first, trials);
+        let who = (0..trials as u32).collect();
+        let strips = Strips { z, sight, capture, sight_step, capture_step, live: trials };
+        Self { policy, batch, first, shape, sweep: sweep_of(&shape), strips, who }
+    }
+
+    /// Plays every trial to its end.
+    pub(super) fn play(&mut self, ends: &mut [End], w: &mut Worker, cancel: &CancelToken) -> Result<(), Cancelled> {
+        let transitions = self.policy.transitions();
+        let last = self.policy.game().grid().steps();
+        let (mut lookups, mut misses) = (0, 0);
+        for k in 0..last {
+            cancel.check()?;
+            w.missing.clear();
+            w.waiting.clear();
+            self.pass(k, transitions.shelf(k), ends, w);
+            lookups += self.strips.live as u64;
+            if !w.waiting.is_empty() {
+                w.missing.sort_unstable();
+                w.missing.dedup();
+                misses += w.missing.len() as u64;
+                w.local.clear();
+                self.policy.fill(k, &w.missing, &mut w.local, &mut w.filler, cancel)?;
+                self.follow(k, w);
+            }
+            if self.strips.live == 0 {
+                break;
+            }
+        }
+        transitions.count(lookups.max(misses), misses);
+        self.finish(last, ends);
+        Ok(())
+    }
+
+    /// Moves every strip that can move, and lists those that wait with the topologies they miss.
+    fn pass(&mut self, k: usize, shelf: RwLockReadGuard<'_, Shelf>, ends: &mut [End], w: &mut Worker) {
+        let mut from = 0;
+        loop {
+            match (self.sweep)(w.width, &self.shape, &mut self.strips, from, &shelf, &mut w.keys) {
+                Stop::End => return,
+                Stop::Caught(strip, lanes) => {
+                    self.retire(strip, lanes, k, ends);
+                    from = strip;
+                }
+                Stop::Missing(strip) => {
+                    for lane in 0..LANES {
+                        let words: Vec<u64> = w.keys.iter().map(|word| word[lane]).collect();
+                        if shelf.find(&words) == 0 {
+                            w.missing.push(Topology::from_words(self.shape.rows, self.shape.size, &words));
+                        }
+                    }
+                    w.waiting.push(strip);
+                    from = strip + 1;
+                }
+            }
+        }
+    }
+
+    /// Moves the strips that waited, from the shelf or, past the table's budget, from what this worker just solved.
+    fn follow(&mut self, k: usize, w: &mut Worker) {
+        let shelf = self.policy.transitions().shelf(k);
+        for &strip in &w.waiting {
+            if self.alone(strip, w.width, &shelf, &mut w.keys) {
+                continue;
+            }
+            for lane in 0..LANES {
+                let words: Vec<u64> = w.keys.iter().map(|word| word[lane]).collect();
+                if w.local.find(&words) == 0 {
+                    let held = shelf.find(&words) as usize;
+                    w.local.insert(&words, shelf.matrix(held));
+                }
+            }
+            let moved = self.alone(strip, w.width, &w.local, &mut w.keys);
+            debug_assert!(moved, "a strip misses what was just solved");
+        }
+    }
+
+    /// Moves one strip, if the shelf holds all it needs.
+    fn alone(&mut self, strip: usize, width: Width, shelf: &Shelf, keys: &mut Keys) -> bool {
+        let live = self.strips.live;
+        self.strips.live = live.min((strip + 1) * LANES);
+        let stop = (self.sweep)(width, &self.shape, &mut self.strips, strip, shelf, keys);
+        self.strips.live = live;
+        stop == Stop::End
+    }
+
+    /// The state of the trial in one place, row by row.
+    fn state(&self, place: usize) -> Vec<f64> {
+        let width = self.shape.size * self.shape.dim;
+        self.strips.z[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
+    }
+
+    /// How the trial in one place ends at its present state, if it does.
+    fn outcome(&self, place: usize) -> Option<Outcome> {
+        let trial = self.first + self.who[place] as usize;
+        Reach::new(self.batch.capture_row(trial, self.shape.size)).ends(&self.state(place), self.shape.dim)
+    }
+
+    /// Takes the trials in `lanes` of a strip out; the last ones take their places.
+    fn retire(&mut self, strip: usize, lanes: u32, k: usize, ends: &mut [End]) {
+        // From the highest lane down, so that a trial that moves in has not been looked at.
+        for lane in (0..LANES).rev().filter(|lane| lanes >> lane & 1 == 1) {
+            let place = strip * LANES + lane;
+            if let Some(outcome) = self.outcome(place) {
+                ends[self.who[place] as usize] = (outcome, k);
+            }
+            self.strips.live -= 1;
+            let last = self.strips.live;
+            self.who[place] = self.who[last];
+            self.strips.copy(&self.shape, last, place);
+        }
+        // Places past the last trial repeat the first of their strip.
+        let live = self.strips.live;
+        for place in live..live.next_multiple_of(LANES) {
+            self.strips.copy(&self.shape, live / LANES * LANES, place);
+        }
+    }
+
+    /// The trials that are left at T: caught in the last instant, or out of time.
+    fn finish(&mut self, last: usize, ends: &mut [End]) {
+        for place in 0..self.strips.live {
+            ends[self.who[place] as usize] = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
+        }
+    }
+}
+
+impl Strips {
+    /// Copies a trial from one place to another.
+    fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
+        let steps = [shape.size * shape.dim, self.sight_step, self.capture_step];
+        for (lanes, step) in [&mut self.z, &mut self.sight, &mut self.capture].into_iter().zip(steps) {
+            for e in 0..step {
+                lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
+            }
+        }
+    }
+}
+
+/// Squared reaches of `width` radii a trial in strips, and the lanes from strip to strip: none where all share one row.
+fn reaches(radii: &[f64], width: usize, first: usize, trials: usize) -> (Vec<Lane>, usize) {
+    if radii.len() == width {
+        return (radii.iter().map(|&radius| [squared_reach(radius); LANES]).collect(), 0);
+    }
+    let mut lanes = vec![[0.0; LANES]; trials.div_ceil(LANES) * width];
+    for place in 0..trials.next_multiple_of(LANES) {
+        let trial = first + if place < trials { place } else { place / LANES * LANES };
+        for (e, &radius) in radii[trial * width..(trial + 1) * width].iter().enumerate() {
+            lanes[place / LANES * width + e][place % LANES] = squared_reach(radius);
+        }
+    }
+    (lanes, width)
+}

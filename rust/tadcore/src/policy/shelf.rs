@@ -1,0 +1,231 @@
+//! The transitions of one grid instant, by topology: what an ensemble reads at every step.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | exp(Cδ) | [`Shelf::matrices`] from `slot × stride` | by columns, each padded with zeros to [`padded`] rows |
+//! | 𝒜 | the words of a [`Topology`](crate::network::Topology) | the key |
+//!
+//! Up to [`DIRECT_BITS`] bits a key is an index itself (n ≤ 3 in I1, n ≤ 2 in I2): 8 KiB an instant, which stays in the
+//! first cache while a whole chunk of trials passes. Up to 64 bits an open-addressing table, beyond a map of words.
+//! Slot 0 is never a topology's: a lookup that gives 0 found nothing.
+
+use std::collections::HashMap;
+
+/// Bits of a topology up to which it is its own index.
+const DIRECT_BITS: usize = 12;
+
+/// Rows of a stored column for matrices of `n` rows: whole vectors up to N = 8.
+#[must_use]
+pub(crate) fn padded(n: usize) -> usize {
+    match n {
+        0..=2 => n,
+        3..=4 => 4,
+        5..=8 => 8,
+        _ => n,
+    }
+}
+
+/// Where the entry of a topology lies.
+#[derive(Debug)]
+pub(crate) enum Index {
+    /// slot = table[key]; empty until the first entry.
+    Direct(Vec<u16>),
+    /// Keys up to 64 bits.
+    Hashed(OpenTable),
+    /// Keys of more words.
+    Wide(HashMap<Box<[u64]>, u32>),
+}
+
+/// Open addressing with linear probing, at most half full; slot 0 marks a free place.
+#[derive(Debug, Default)]
+pub(crate) struct OpenTable {
+    places: Vec<(u64, u32)>,
+    shift: u32,
+}
+
+impl OpenTable {
+    #[inline(always)]
+    fn home(key: u64, shift: u32) -> usize {
+        // Fibonacci hashing: the high bits of a product with 2⁶⁴/φ are well mixed.
+        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> shift) as usize
+    }
+
+    #[inline(always)]
+    fn find(&self, key: u64) -> u32 {
+        if self.places.is_empty() {
+            return 0;
+        }
+        let mask = self.places.len() - 1;
+        let mut at = Self::home(key, self.shift);
+        loop {
+            let (held, slot) = self.places[at & mask];
+            if slot == 0 || held == key {
+                return slot;
+            }
+            at += 1;
+        }
+    }
+
+    fn insert(&mut self, key: u64, slot: u32) {
+        if 2 * (slot as usize + 1) > self.places.len() {
+            let size = (2 * self.places.len()).max(16);
+            let old = std::mem::replace(&mut self.places, vec![(0, 0); size]);
+            self.shift = 64 - size.trailing_zeros();
+            for (key, slot) in old.into_iter().filter(|&(_, slot)| slot != 0) {
+                self.place(key, slot);
+            }
+        }
+        self.place(key, slot);
+    }
+
+    fn place(&mut self, key: u64, slot: u32) {
+        let mask = self.places.len() - 1;
+        let mut at = Self::home(key, self.shift);
+        while self.places[at & mask].1 != 0 {
+            at += 1;
+        }
+        self.places[at & mask] = (key, slot);
+    }
+}
+
+/// The transitions of one instant.
+#[derive(Debug)]
+pub(crate) struct Shelf {
+    index: Index,
+    matrices: Vec<f64>,
+    keys: Vec<u64>,
+    bits: usize,
+    stride: usize,
+}
+
+impl Shelf {
+    /// An empty shelf for N = `size` and `rows` constrained players.
+    pub(crate) fn new(rows: usize, size: usize) -> Self {
+        let bits = rows * size;
+        let index = match bits {
+            0..=DIRECT_BITS => Index::Direct(Vec::new()),
+            13..=64 => Index::Hashed(OpenTable::default()),
+            _ => Index::Wide(HashMap::new()),
+        };
+        Self { index, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size) }
+    }
+
+    /// The slot of a topology's entry, 0 where there is none.
+    #[inline(always)]
+    pub(crate) fn find(&self, words: &[u64]) -> u32 {
+        match &self.index {
+            Index::Direct(slots) => slots.get(words[0] as usize).map_or(0, |&slot| u32::from(slot)),
+            Index::Hashed(table) => table.find(words[0]),
+            Index::Wide(map) => map.get(words).copied().unwrap_or(0),
+        }
+    }
+
+    /// All matrices, one every `stride` numbers.
+    #[inline(always)]
+    pub(crate) fn matrices(&self) -> &[f64] {
+        &self.matrices
+    }
+
+    /// Entries held.
+    pub(crate) fn len(&self) -> usize {
+        self.keys.len() / self.bits.div_ceil(64)
+    }
+
+    /// The keys in the order of their slots, the first of slot 1.
+    pub(crate) fn keys(&self) -> std::slice::ChunksExact<'_, u64> {
+        self.keys.chunks_exact(self.bits.div_ceil(64))
+    }
+
+    /// The matrix in a slot.
+    pub(crate) fn matrix(&self, slot: usize) -> &[f64] {
+        &self.matrices[slot * self.stride..(slot + 1) * self.stride]
+    }
+
+    /// Bytes that one more entry takes, the shelf's own memory with the first.
+    pub(crate) fn entry_bytes(&self) -> usize {
+        let words = self.bits.div_ceil(64);
+        let lookup = match &self.index {
+            Index::Direct(slots) => {
+                if slots.is_empty() {
+                    size_of::<u16>() << self.bits
+                } else {
+                    0
+                }
+            }
+            Index::Hashed(_) => 4 * size_of::<(u64, u32)>(),
+            Index::Wide(_) => 2 * (size_of::<(Box<[u64]>, u32)>() + 8 * words),
+        };
+        // A vector that grows by doubling is up to half empty.
+        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words) + lookup
+    }
+
+    /// Adds an entry that is not there yet.
+    pub(crate) fn insert(&mut self, words: &[u64], matrix: &[f64]) {
+        debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
+        if self.matrices.is_empty() {
+            self.matrices.resize(self.stride, 0.0);
+        }
+        let slot = self.matrices.len() / self.stride;
+        self.matrices.extend_from_slice(matrix);
+        self.keys.extend_from_slice(words);
+        match &mut self.index {
+            Index::Direct(slots) => {
+                if slots.is_empty() {
+                    slots.resize(1 << self.bits, 0);
+                }
+                slots[words[0] as usize] = slot as u16;
+            }
+            Index::Hashed(table) => table.insert(words[0], slot as u32),
+            Index::Wide(map) => {
+                map.insert(words.into(), slot as u32);
+            }
+        }
+    }
+
+    /// Forgets every entry and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.matrices.clear();
+        self.keys.clear();
+        match &mut self.index {
+            Index::Direct(slots) => slots.fill(0),
+            Index::Hashed(table) => table.places.fill((0, 0)),
+            Index::Wide(map) => map.clear(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Thousands of entries of each kind of key, each found again with its own matrix, and nothing else found.
+    #[test]
+    fn every_entry_is_found_again() {
+        for (rows, size) in [(3, 4), (4, 4), (4, 5), (8, 8), (8, 9), (12, 13)] {
+            let mut shelf = Shelf::new(rows, size);
+            let (bits, stride) = (rows * size, size * padded(size));
+            let mask = if bits >= 64 { u64::MAX } else { (1 << bits) - 1 };
+            let key = |i: u64| -> Vec<u64> {
+                let mixed = i.wrapping_mul(0x2545_F491_4F6C_DD1D);
+                let last = if bits % 64 == 0 { u64::MAX } else { (1 << (bits % 64)) - 1 };
+                match bits.div_ceil(64) {
+                    1 => vec![if bits <= 16 { i } else { mixed } & mask],
+                    words => (0..words).map(|w| if w == 0 { i } else { mixed & last }).collect(),
+                }
+            };
+            for i in 0..3000 {
+                assert_eq!(shelf.find(&key(i)), 0, "{rows} {size} {i}");
+                shelf.insert(&key(i), &vec![i as f64; stride]);
+            }
+            assert_eq!(shelf.len(), 3000);
+            for i in 0..3000 {
+                let slot = shelf.find(&key(i)) as usize;
+                assert_eq!(slot, i as usize + 1);
+                assert!(shelf.matrix(slot).iter().all(|&x| x == i as f64));
+            }
+            assert_eq!(shelf.find(&key(3000)), 0);
+            shelf.clear();
+            assert_eq!((shelf.find(&key(5)), shelf.len()), (0, 0));
+        }
+    }
+}

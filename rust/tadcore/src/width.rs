@@ -1,0 +1,48 @@
+//! How wide the processor's vectors are: hot loops are compiled for each width, and the processor decides at run time.
+//!
+//! Only the width differs: the operations and their order are the same and none is fused, so every width gives the
+//! same bits.
+
+/// Which instructions the processor has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Width {
+    /// Whatever the target guarantees.
+    Baseline,
+    /// 256 bits; only made by [`Width::detect`] after asking the processor.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Width {
+    /// Asks the processor.
+    pub(crate) fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            return Self::Avx2;
+        }
+        Self::Baseline
+    }
+}
+
+/// Defines a function by a body compiled for every [`Width`].
+macro_rules! widened {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
+        $(#[$doc])*
+        $vis fn $name $(<$(const $g: usize),*>)? (width: $crate::width::Width, $($arg: $ty),*) $(-> $ret)? {
+            #[inline(always)]
+            fn body $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? $body
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2")]
+            fn avx2 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
+                body $(::<$($g),*>)? ($($arg),*)
+            }
+            match width {
+                $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
+                // SAFETY: this variant exists only where the processor said that it has AVX2.
+                #[cfg(target_arch = "x86_64")]
+                $crate::width::Width::Avx2 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
+            }
+        }
+    };
+}
+pub(crate) use widened;
