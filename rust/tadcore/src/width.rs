@@ -11,20 +11,32 @@ pub(crate) enum Width {
     /// 256 bits; only made by [`Width::detect`] after asking the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// 512 bits, and all of the above; only made by [`Width::detect`].
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl Width {
     /// Asks the processor.
     pub(crate) fn detect() -> Self {
+        Self::all().last().copied().unwrap_or(Self::Baseline)
+    }
+
+    /// Every width that this processor has, the narrowest first.
+    pub(crate) fn all() -> Vec<Self> {
+        let mut all = vec![Self::Baseline];
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
+            all.push(Self::Avx2);
+            if std::arch::is_x86_feature_detected!("avx512f") {
+                all.push(Self::Avx512);
+            }
         }
-        Self::Baseline
+        all
     }
 }
 
-/// Defines a function by a body compiled for every [`Width`].
+/// Defines a function by a body compiled for 128 and for 256 bits; wider registers did not pay in these loops.
 macro_rules! widened {
     ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
         $(#[$doc])*
@@ -38,9 +50,9 @@ macro_rules! widened {
             }
             match width {
                 $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
-                // SAFETY: this variant exists only where the processor said that it has AVX2.
+                // SAFETY: these variants exist only where the processor said that it has AVX2.
                 #[cfg(target_arch = "x86_64")]
-                $crate::width::Width::Avx2 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
+                $crate::width::Width::Avx2 | $crate::width::Width::Avx512 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
             }
         }
     };

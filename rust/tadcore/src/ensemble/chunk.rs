@@ -23,7 +23,6 @@ pub(super) type End = (Outcome, usize);
 /// The scratch of one worker, reused from chunk to chunk.
 #[derive(Debug)]
 pub(super) struct Worker {
-    width: Width,
     filler: Filler,
     local: Shelf,
     keys: Keys,
@@ -35,7 +34,6 @@ impl Worker {
     pub(super) fn new(policy: &Policy) -> Self {
         let (rows, size) = (policy.game().constrained(), policy.game().size());
         Self {
-            width: Width::detect(),
             filler: Filler::default(),
             local: Shelf::new(rows, size),
             keys: vec![[0; LANES]; (rows * size).div_ceil(64)],
@@ -59,7 +57,7 @@ pub(super) struct Chunk<'a> {
 
 impl<'a> Chunk<'a> {
     /// The trials from `first` on at their initial positions.
-    pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize) -> Self {
+    pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize, width: Width) -> Self {
         let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
         let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
         let strips = trials.div_ceil(LANES);
@@ -78,7 +76,7 @@ impl<'a> Chunk<'a> {
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who = (0..trials as u32).collect();
         let strips = Strips { z, sight, capture, sight_step, capture_step, live: trials };
-        Self { policy, batch, first, shape, sweep: sweep_of(&shape), strips, who }
+        Self { policy, batch, first, shape, sweep: sweep_of(&shape, width), strips, who }
     }
 
     /// Plays every trial to its end.
@@ -113,7 +111,7 @@ impl<'a> Chunk<'a> {
     fn pass(&mut self, k: usize, shelf: RwLockReadGuard<'_, Shelf>, ends: &mut [End], w: &mut Worker) {
         let mut from = 0;
         loop {
-            match (self.sweep)(w.width, &self.shape, &mut self.strips, from, &shelf, &mut w.keys) {
+            match (self.sweep)(&self.shape, &mut self.strips, from, &shelf, &mut w.keys) {
                 Stop::End => return,
                 Stop::Caught(strip, lanes) => {
                     self.retire(strip, lanes, k, ends);
@@ -137,7 +135,7 @@ impl<'a> Chunk<'a> {
     fn follow(&mut self, k: usize, w: &mut Worker) {
         let shelf = self.policy.transitions().shelf(k);
         for &strip in &w.waiting {
-            if self.alone(strip, w.width, &shelf, &mut w.keys) {
+            if self.alone(strip, &shelf, &mut w.keys) {
                 continue;
             }
             for lane in 0..LANES {
@@ -147,16 +145,16 @@ impl<'a> Chunk<'a> {
                     w.local.insert(&words, shelf.matrix(held));
                 }
             }
-            let moved = self.alone(strip, w.width, &w.local, &mut w.keys);
+            let moved = self.alone(strip, &w.local, &mut w.keys);
             debug_assert!(moved, "a strip misses what was just solved");
         }
     }
 
     /// Moves one strip, if the shelf holds all it needs.
-    fn alone(&mut self, strip: usize, width: Width, shelf: &Shelf, keys: &mut Keys) -> bool {
+    fn alone(&mut self, strip: usize, shelf: &Shelf, keys: &mut Keys) -> bool {
         let live = self.strips.live;
         self.strips.live = live.min((strip + 1) * LANES);
-        let stop = (self.sweep)(width, &self.shape, &mut self.strips, strip, shelf, keys);
+        let stop = (self.sweep)(&self.shape, &mut self.strips, strip, shelf, keys);
         self.strips.live = live;
         stop == Stop::End
     }

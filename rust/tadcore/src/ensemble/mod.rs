@@ -13,6 +13,7 @@
 
 mod chunk;
 mod strip;
+mod vector;
 
 use std::thread::available_parallelism;
 
@@ -22,7 +23,8 @@ use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::policy::Policy;
 use crate::simulation::{Outcome, Setup};
-use chunk::{Chunk, Worker};
+use crate::width::Width;
+use chunk::{Chunk, End, Worker};
 
 /// Trials of one chunk at most.
 pub const CHUNK: usize = 4096;
@@ -88,20 +90,29 @@ pub fn run(
     }
     let mut ends = vec![(Outcome::Timeout, 0); trials];
     let threads = threads.filter(|&t| t > 0).unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
-    let size = trials.div_ceil(threads).clamp(1, CHUNK);
-    if threads == 1 || trials <= size {
+    play(policy, batch, threads, Width::detect(), &mut ends, cancel)?;
+    Ok(ends)
+}
+
+/// Plays checked trials in chunks.
+fn play(
+    policy: &Policy,
+    batch: &Batch,
+    threads: usize,
+    width: Width,
+    ends: &mut [End],
+    cancel: &CancelToken,
+) -> Result<(), RunError> {
+    let size = ends.len().div_ceil(threads).clamp(1, CHUNK);
+    let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
+        Chunk::new(policy, batch, c * size, ends.len(), width).play(ends, worker, cancel)
+    };
+    if threads == 1 || ends.len() <= size {
         let mut worker = Worker::new(policy);
-        for (c, ends) in ends.chunks_mut(size).enumerate() {
-            Chunk::new(policy, batch, c * size, ends.len()).play(ends, &mut worker, cancel)?;
-        }
-        return Ok(ends);
+        ends.chunks_mut(size).enumerate().try_for_each(|chunk| one(&mut worker, chunk))?;
+        return Ok(());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|_| RunError::Threads(threads))?;
-    pool.install(|| {
-        ends.par_chunks_mut(size).enumerate().try_for_each_init(
-            || Worker::new(policy),
-            |worker, (c, ends)| Chunk::new(policy, batch, c * size, ends.len()).play(ends, worker, cancel),
-        )
-    })?;
-    Ok(ends)
+    pool.install(|| ends.par_chunks_mut(size).enumerate().try_for_each_init(|| Worker::new(policy), one))?;
+    Ok(())
 }

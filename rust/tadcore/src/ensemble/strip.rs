@@ -8,10 +8,13 @@
 //! | exp(Cδ) | [`Shelf`] | by columns, so that a column times one number is a vector operation |
 //!
 //! Every sum runs in the order of [`crate::simulation::simulate`] and no product is fused with a sum, so that a trial
-//! ends as it would alone, to the bit, at every [`Width`](crate::width::Width).
+//! ends as it would alone, to the bit, at every [`Width`].
 
-use crate::policy::shelf::Shelf;
-use crate::width::widened;
+use super::vector::{Plain, Vector};
+#[cfg(target_arch = "x86_64")]
+use super::vector::{Wide256, Wide512};
+use crate::policy::shelf::{DIRECT_BITS, Shelf, padded};
+use crate::width::Width;
 
 /// Trials side by side.
 pub(super) const LANES: usize = 8;
@@ -62,194 +65,278 @@ pub(super) enum Stop {
 /// The topologies of one strip, a lane for each word.
 pub(super) type Keys = Vec<[u64; LANES]>;
 
-/// ‖z_i‖² of eight trials.
+/// Repeats a block for the constants 0…7 that lie below a limit known to the compiler.
+macro_rules! unrolled {
+    ($i:ident < $limit:expr, $body:block) => {
+        unrolled!(@ $i $limit, $body, 0 1 2 3 4 5 6 7)
+    };
+    (@ $i:ident $limit:expr, $body:block, $($value:literal)*) => {
+        $({
+            const $i: usize = $value;
+            if $i < $limit $body
+        })*
+    };
+}
+
+// No closures below: they are functions of their own, and the compiler would not inline the wide instructions into them.
+
+/// ‖z_i‖² of eight trials, the axes added in order.
 #[inline(always)]
-fn norms(zi: &[Lane]) -> Lane {
-    let mut sum = [0.0; LANES];
-    for (x, lane) in zi.iter().enumerate() {
-        for l in 0..LANES {
-            let square = lane[l] * lane[l];
-            sum[l] = if x == 0 { square } else { sum[l] + square };
-        }
+fn norm<V: Vector, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
+    let first = V::load(&z[i * D]);
+    let mut sum = V::mul(first, first);
+    for x in 1..D {
+        let a = V::load(&z[i * D + x]);
+        sum = V::add(sum, V::mul(a, a));
     }
     sum
 }
 
 /// ‖z_i − z_j‖² of eight trials.
 #[inline(always)]
-fn distances(zi: &[Lane], zj: &[Lane]) -> Lane {
-    let mut sum = [0.0; LANES];
-    for (x, (a, b)) in zi.iter().zip(zj).enumerate() {
-        for l in 0..LANES {
-            let difference = a[l] - b[l];
-            let square = difference * difference;
-            sum[l] = if x == 0 { square } else { sum[l] + square };
-        }
+fn distance<V: Vector, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight {
+    let first = V::sub(V::load(&z[i * D]), V::load(&z[j * D]));
+    let mut sum = V::mul(first, first);
+    for x in 1..D {
+        let a = V::sub(V::load(&z[i * D + x]), V::load(&z[j * D + x]));
+        sum = V::add(sum, V::mul(a, a));
     }
     sum
 }
 
-/// Sets a bit in the keys of the trials whose squared distance is within reach.
-#[inline(always)]
-fn see(keys: &mut [[u64; LANES]], bit: usize, d2: &Lane, reach: &Lane) {
-    let word = &mut keys[bit / 64];
-    for l in 0..LANES {
-        word[l] |= u64::from(d2[l] <= reach[l]) << (bit % 64);
-    }
-}
-
 /// The keys of one strip, and a bit for each trial in which somebody is caught.
 #[inline(always)]
-fn observe<const N: usize, const M: usize, const D: usize>(
-    shape: &Shape,
+fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
     z: &[Lane],
     sight: &[Lane],
     capture: &[Lane],
-    keys: &mut [[u64; LANES]],
-) -> u32 {
-    let (n, m, d) = if N > 0 { (N, M, D) } else { (shape.size, shape.rows, shape.dim) };
-    keys.fill([0; LANES]);
-    let mut caught = [0u64; LANES];
-    for i in 0..n {
-        let zi = &z[i * d..(i + 1) * d];
-        let d2 = norms(zi);
-        for l in 0..LANES {
-            caught[l] |= u64::from(d2[l] <= capture[i][l]) << l;
+) -> ([u64; LANES], u8) {
+    let mut keys = V::no_keys();
+    let mut caught = 0;
+    unrolled!(I < N, {
+        let d2 = norm::<V, D>(z, I);
+        caught |= V::within(d2, V::load(&capture[I]));
+        if I < M {
+            keys = V::see(keys, 1 << (I * N + I), d2, V::load(&sight[I]));
         }
-        if i < m {
-            see(keys, i * n + i, &d2, &sight[i]);
-        }
-        for j in 0..i {
-            let d2 = distances(zi, &z[j * d..(j + 1) * d]);
-            if i < m {
-                see(keys, i * n + j, &d2, &sight[i]);
+        unrolled!(J < I, {
+            let d2 = distance::<V, D>(z, I, J);
+            if I < M {
+                keys = V::see(keys, 1 << (I * N + J), d2, V::load(&sight[I]));
             }
-            see(keys, j * n + i, &d2, &sight[j]);
-        }
-    }
-    caught.iter().fold(0, |all, &bit| all | bit) as u32
+            keys = V::see(keys, 1 << (J * N + I), d2, V::load(&sight[J]));
+        });
+    });
+    (V::keys(keys), caught)
 }
 
-/// z ← exp(Cδ) z for one strip whose matrices lie in `slots`. `A` is the padded N.
+/// z ← exp(Cδ) z for one strip whose matrices lie in `slots`; a column is Q registers of four.
 #[inline(always)]
-fn step<const N: usize, const D: usize, const A: usize>(z: &mut [Lane], slots: &[usize; LANES], matrices: &[f64]) {
-    for x in 0..D {
-        let mut next = [[0.0; A]; LANES];
-        for l in 0..LANES {
-            let t = &matrices[slots[l] * N * A..][..N * A];
-            let first = z[x][l];
-            for a in 0..A {
-                next[l][a] = t[a] * first;
-            }
-            for j in 1..N {
-                let value = z[j * D + x][l];
-                for a in 0..A {
-                    next[l][a] += t[j * A + a] * value;
+fn step<V: Vector, const N: usize, const D: usize, const Q: usize>(
+    z: &mut [Lane],
+    slots: &[usize; LANES],
+    quads: &[[f64; 4]],
+) {
+    for half in 0..2 {
+        let mut next = [[[V::load4(&[0.0; 4]); 4]; Q]; D];
+        for l in 0..4 {
+            let lane = 4 * half + l;
+            let t = &quads[slots[lane] * N * Q..][..N * Q];
+            for q in 0..Q {
+                for x in 0..D {
+                    next[x][q][l] = V::scale4(V::load4(&t[q]), z[x][lane]);
+                }
+                for j in 1..N {
+                    let column = V::load4(&t[j * Q + q]);
+                    for x in 0..D {
+                        next[x][q][l] = V::add_scaled4(next[x][q][l], column, z[j * D + x][lane]);
+                    }
                 }
             }
         }
-        for a in 0..N {
-            for l in 0..LANES {
-                z[a * D + x][l] = next[l][a];
-            }
-        }
-    }
-}
-
-/// The same for sizes known only at run time.
-fn step_any(shape: &Shape, z: &mut [Lane], slots: &[usize; LANES], matrices: &[f64], next: &mut Vec<f64>) {
-    let (n, d) = (shape.size, shape.dim);
-    next.resize(n, 0.0);
-    let stride = n * crate::policy::shelf::padded(n);
-    for (l, slot) in slots.iter().enumerate() {
-        let t = &matrices[slot * stride..][..stride];
-        for x in 0..d {
-            next.fill(0.0);
-            for (j, column) in t.chunks_exact(stride / n).enumerate() {
-                let value = z[j * d + x][l];
-                for (sum, c) in next.iter_mut().zip(column) {
-                    *sum += c * value;
+        for x in 0..D {
+            for q in 0..Q {
+                let rows = V::transpose4(next[x][q]);
+                for r in 0..4 {
+                    if 4 * q + r < N {
+                        V::store4(rows[r], &mut z[(4 * q + r) * D + x].as_chunks_mut().0[half]);
+                    }
                 }
             }
-            for (a, &value) in next.iter().enumerate() {
-                z[a * d + x][l] = value;
-            }
         }
     }
 }
 
-/// The slots of eight keys, and whether all were found.
 #[inline(always)]
-fn find<const N: usize>(shape: &Shape, shelf: &Shelf, keys: &[[u64; LANES]]) -> ([usize; LANES], bool) {
-    let mut slots = [0; LANES];
-    for l in 0..LANES {
-        let slot = if N > 0 || shape.words == 1 {
-            shelf.find(&[keys[0][l]])
-        } else {
-            let words: Vec<u64> = keys.iter().map(|word| word[l]).collect();
-            shelf.find(&words)
-        };
-        slots[l] = slot as usize;
-    }
-    (slots, slots.iter().all(|&slot| slot != 0))
-}
-
-widened! {
-    /// Moves the strips from `from` on by one step, up to the first that cannot move; its keys are left in `keys`.
-    fn sweep<const N: usize, const M: usize, const D: usize, const A: usize>(
-        shape: &Shape,
-        strips: &mut Strips,
-        from: usize,
-        shelf: &Shelf,
-        keys: &mut Keys,
-    ) -> Stop {
-        let (n, m, d) = if N > 0 { (N, M, D) } else { (shape.size, shape.rows, shape.dim) };
-        let mut next = Vec::new();
-        for strip in from..strips.live.div_ceil(LANES) {
-            let z = &mut strips.z[strip * n * d..][..n * d];
-            let sight = &strips.sight[strip * strips.sight_step..][..m];
-            let capture = &strips.capture[strip * strips.capture_step..][..n];
-            let mut word = [[0; LANES]];
-            let seen = if N > 0 { &mut word[..] } else { &mut keys[..] };
-            let caught = observe::<N, M, D>(shape, z, sight, capture, seen);
+fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usize>(
+    strips: &mut Strips,
+    from: usize,
+    shelf: &Shelf,
+    keys: &mut Keys,
+) -> Stop {
+    let (quads, direct) = (shelf.matrices().as_chunks().0, shelf.direct());
+    for strip in from..strips.live.div_ceil(LANES) {
+        let z = &mut strips.z[strip * N * D..][..N * D];
+        let sight = &strips.sight[strip * strips.sight_step..][..M];
+        let capture = &strips.capture[strip * strips.capture_step..][..N];
+        let (seen, caught) = observe::<V, N, M, D>(z, sight, capture);
+        if caught != 0 {
+            let caught = u32::from(caught) & playing(strips.live, strip);
             if caught != 0 {
-                let playing = strips.live - strip * LANES;
-                let caught = if playing >= LANES { caught } else { caught & ((1 << playing) - 1) };
-                if caught != 0 {
-                    return Stop::Caught(strip, caught);
-                }
-            }
-            let (slots, complete) = find::<N>(shape, shelf, seen);
-            if !complete {
-                if N > 0 {
-                    keys[0] = word[0];
-                }
-                return Stop::Missing(strip);
-            }
-            if N > 0 {
-                step::<N, D, A>(z, &slots, shelf.matrices());
-            } else {
-                step_any(shape, z, &slots, shelf.matrices(), &mut next);
+                return Stop::Caught(strip, caught);
             }
         }
-        Stop::End
+        let (mut slots, mut missing) = ([0; LANES], false);
+        for l in 0..LANES {
+            slots[l] = if N * M <= DIRECT_BITS {
+                if seen[l] < direct.len() as u64 { usize::from(direct[seen[l] as usize]) } else { 0 }
+            } else {
+                shelf.find(&[seen[l]]) as usize
+            };
+            missing |= slots[l] == 0;
+        }
+        if missing {
+            keys[0] = seen;
+            return Stop::Missing(strip);
+        }
+        step::<V, N, D, Q>(z, &slots, quads);
+    }
+    Stop::End
+}
+
+/// A bit for each place of a strip in which a trial plays.
+#[inline(always)]
+fn playing(live: usize, strip: usize) -> u32 {
+    match live - strip * LANES {
+        count @ 0..LANES => (1 << count) - 1,
+        _ => u32::MAX,
     }
 }
 
-/// A sweep compiled for its sizes.
-pub(super) type Sweep = fn(crate::width::Width, &Shape, &mut Strips, usize, &Shelf, &mut Keys) -> Stop;
+/// The same for sizes known only at run time, trial after trial.
+fn sweep_any(shape: &Shape, strips: &mut Strips, from: usize, shelf: &Shelf, keys: &mut Keys) -> Stop {
+    let (n, d) = (shape.size, shape.dim);
+    let stride = n * padded(n);
+    let (mut state, mut words) = (vec![0.0; n * d], vec![0; shape.words]);
+    let mut next = vec![0.0; padded(n)];
+    for strip in from..strips.live.div_ceil(LANES) {
+        let z = &mut strips.z[strip * n * d..][..n * d];
+        let sight = &strips.sight[strip * strips.sight_step..][..shape.rows];
+        let capture = &strips.capture[strip * strips.capture_step..][..n];
+        let caught = observe_any(shape, z, sight, capture, keys) & playing(strips.live, strip);
+        if caught != 0 {
+            return Stop::Caught(strip, caught);
+        }
+        let mut slots = [0; LANES];
+        for (l, slot) in slots.iter_mut().enumerate() {
+            words.iter_mut().zip(&*keys).for_each(|(word, lanes)| *word = lanes[l]);
+            *slot = shelf.find(&words) as usize;
+        }
+        if slots.contains(&0) {
+            return Stop::Missing(strip);
+        }
+        for (l, slot) in slots.into_iter().enumerate() {
+            state.iter_mut().zip(&*z).for_each(|(x, lane)| *x = lane[l]);
+            let t = &shelf.matrices()[slot * stride..][..stride];
+            for x in 0..d {
+                next.fill(0.0);
+                for (j, column) in t.chunks_exact(padded(n)).enumerate() {
+                    let value = state[j * d + x];
+                    for (sum, c) in next.iter_mut().zip(column) {
+                        *sum += c * value;
+                    }
+                }
+                for (a, &value) in next[..n].iter().enumerate() {
+                    z[a * d + x][l] = value;
+                }
+            }
+        }
+    }
+    Stop::End
+}
+
+/// [`observe`] for any size.
+fn observe_any(shape: &Shape, z: &[Lane], sight: &[Lane], capture: &[Lane], keys: &mut Keys) -> u32 {
+    let (n, m, d) = (shape.size, shape.rows, shape.dim);
+    keys.fill([0; LANES]);
+    let mut caught = [0; LANES];
+    for i in 0..n {
+        for j in 0..=i {
+            let mut d2 = [0.0; LANES];
+            for x in 0..d {
+                let (a, b) = (&z[i * d + x], &z[j * d + x]);
+                for l in 0..LANES {
+                    let difference = if i == j { a[l] } else { a[l] - b[l] };
+                    d2[l] += difference * difference;
+                }
+            }
+            for (row, column) in [(i, j), (j, i)] {
+                let bit = row * n + column;
+                if row < m {
+                    for l in 0..LANES {
+                        keys[bit / 64][l] |= u64::from(d2[l] <= sight[row][l]) << (bit % 64);
+                    }
+                }
+            }
+            if i == j {
+                for l in 0..LANES {
+                    caught[l] |= u32::from(d2[l] <= capture[i][l]) << l;
+                }
+            }
+        }
+    }
+    caught.into_iter().fold(0, |all, bit| all | bit)
+}
+
+/// Moves the strips from one on by one step, up to the first that cannot move; its keys are left in the last argument.
+pub(super) type Sweep = fn(&Shape, &mut Strips, usize, &Shelf, &mut Keys) -> Stop;
+
+/// A sweep compiled for its sizes and for a width's registers.
+fn sized<const N: usize, const M: usize, const D: usize, const Q: usize>(width: Width) -> Sweep {
+    match width {
+        Width::Baseline => |_, strips, from, shelf, keys| sweep::<Plain, N, M, D, Q>(strips, from, shelf, keys),
+        #[cfg(target_arch = "x86_64")]
+        Width::Avx2 => {
+            #[target_feature(enable = "avx2")]
+            fn wide<const N: usize, const M: usize, const D: usize, const Q: usize>(
+                strips: &mut Strips,
+                from: usize,
+                shelf: &Shelf,
+                keys: &mut Keys,
+            ) -> Stop {
+                sweep::<Wide256, N, M, D, Q>(strips, from, shelf, keys)
+            }
+            // SAFETY: this width exists only where the processor said that it has AVX2.
+            |_, strips, from, shelf, keys| unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+        }
+        #[cfg(target_arch = "x86_64")]
+        Width::Avx512 => {
+            #[target_feature(enable = "avx2,avx512f")]
+            fn wide<const N: usize, const M: usize, const D: usize, const Q: usize>(
+                strips: &mut Strips,
+                from: usize,
+                shelf: &Shelf,
+                keys: &mut Keys,
+            ) -> Stop {
+                sweep::<Wide512, N, M, D, Q>(strips, from, shelf, keys)
+            }
+            // SAFETY: this width exists only where the processor said that it has AVX2 and AVX-512F.
+            |_, strips, from, shelf, keys| unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+        }
+    }
+}
 
 /// The sweep for a shape: compiled for N ≤ 8 in the plane and in space, one version for all else.
-pub(super) fn sweep_of(shape: &Shape) -> Sweep {
-    macro_rules! sized {
-        ($($n:literal $m:literal $a:literal;)*) => {
+pub(super) fn sweep_of(shape: &Shape, width: Width) -> Sweep {
+    macro_rules! choose {
+        ($($n:literal $m:literal $q:literal;)*) => {
             match (shape.size, shape.rows, shape.dim) {
-                $(($n, $m, 2) => sweep::<$n, $m, 2, $a>, ($n, $m, 3) => sweep::<$n, $m, 3, $a>,)*
-                _ => sweep::<0, 0, 0, 0>,
+                $(($n, $m, 2) => sized::<$n, $m, 2, $q>(width), ($n, $m, 3) => sized::<$n, $m, 3, $q>(width),)*
+                _ => sweep_any,
             }
         };
     }
-    sized! {
-        2 1 2; 2 2 2; 3 2 4; 3 3 4; 4 3 4; 4 4 4; 5 4 8; 5 5 8; 6 5 8; 6 6 8; 7 6 8; 7 7 8; 8 7 8; 8 8 8;
+    choose! {
+        2 1 1; 2 2 1; 3 2 1; 3 3 1; 4 3 1; 4 4 1; 5 4 2; 5 5 2; 6 5 2; 6 6 2; 7 6 2; 7 7 2; 8 7 2; 8 8 2;
     }
 }

@@ -12,17 +12,12 @@
 use std::collections::HashMap;
 
 /// Bits of a topology up to which it is its own index.
-const DIRECT_BITS: usize = 12;
+pub(crate) const DIRECT_BITS: usize = 12;
 
-/// Rows of a stored column for matrices of `n` rows: whole vectors up to N = 8.
+/// Rows of a stored column for matrices of `n` rows: whole vectors of four.
 #[must_use]
 pub(crate) fn padded(n: usize) -> usize {
-    match n {
-        0..=2 => n,
-        3..=4 => 4,
-        5..=8 => 8,
-        _ => n,
-    }
+    n.next_multiple_of(4)
 }
 
 /// Where the entry of a topology lies.
@@ -117,6 +112,15 @@ impl Shelf {
             Index::Direct(slots) => slots.get(words[0] as usize).map_or(0, |&slot| u32::from(slot)),
             Index::Hashed(table) => table.find(words[0]),
             Index::Wide(map) => map.get(words).copied().unwrap_or(0),
+        }
+    }
+
+    /// The slots by key of a shelf with at most [`DIRECT_BITS`] bits, for sweeps that know their size.
+    #[inline(always)]
+    pub(crate) fn direct(&self) -> &[u16] {
+        match &self.index {
+            Index::Direct(slots) => slots,
+            _ => &[],
         }
     }
 

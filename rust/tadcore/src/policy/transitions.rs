@@ -40,7 +40,8 @@ impl Claims {
     }
 
     fn claim<'a>(&'a self, topology: &'a Topology) -> Option<Claim<'a>> {
-        self.lock().insert(topology.clone()).then_some(Claim { claims: self, topology })
+        let free = self.lock().insert(topology.clone());
+        free.then(|| Claim { claims: self, topology })
     }
 
     fn wait(&self, topology: &Topology, cancel: &CancelToken) -> Result<(), Cancelled> {

@@ -10,9 +10,11 @@
 //!
 //! The vector is laid out A first, then B, m × N each.
 
-use super::newton::Objective;
+use super::newton::{Limits, Objective, Reached, Workspace, minimise};
 use super::objective::norm;
 use super::problem::Problem;
+use super::start::Variable;
+use crate::width::widened;
 
 /// Θ over complex gains.
 pub(super) struct ComplexGains<'a, const N: usize, const M: usize> {
@@ -69,6 +71,7 @@ fn add_product(row: &mut [f64], n: usize, factor: f64, x: &[f64], e: &[f64]) {
 }
 
 impl<const N: usize, const M: usize> Objective for ComplexGains<'_, N, M> {
+    #[inline(always)]
     fn width(&self) -> usize {
         let (n, m) = self.dimensions();
         2 * n * m
@@ -143,50 +146,83 @@ impl<const N: usize, const M: usize> Objective for ComplexGains<'_, N, M> {
         }
     }
 
-    /// With the common factor 4, s = γ₁r_ir_j and the quadratic part W:
-    /// - AA: δ γ₁r_i X_r + s[(AAᵀ + BBᵀ)_ij **I** + a_jᵀa_i − b_jᵀb_i] + Wᵀ W **I** + w_jᵀw_i
-    /// - BB: δ γ₁r_i X_r + s[(AAᵀ + BBᵀ)_ij **I** + b_jᵀb_i − a_jᵀa_i] + WᵀW **I** − w_jᵀw_i
-    /// - BA: −δ γ₁r_i X_i + s[(BAᵀ − ABᵀ)_ij **I** + a_jᵀb_i + b_jᵀa_i]
+    /// With s = 4γ₁r_ir_j and the constant parts Q± = 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I**:
+    /// - AA: 4δ_ij γ₁r_i X_r + s[(AAᵀ + BBᵀ)_ij **I** + a_jᵀa_i − b_jᵀb_i] + Q₊
+    /// - BB: 4δ_ij γ₁r_i X_r + s[(AAᵀ + BBᵀ)_ij **I** + b_jᵀb_i − a_jᵀa_i] + Q₋
+    /// - BA: −4δ_ij γ₁r_i X_i + s[(BAᵀ − ABᵀ)_ij **I** + a_jᵀb_i + b_jᵀa_i]
     #[inline(always)]
     fn hessian(&mut self, g: &[f64], out: &mut [f64]) {
         let p = self.problem;
         let (n, m) = self.dimensions();
         let (half, width) = (m * n, 2 * m * n);
         let (ra, ib) = g.split_at(half);
+        let (upper, lower) = out.split_at_mut(half * width);
         for i in 0..m {
-            let (ai, bi) = (&ra[i * n..(i + 1) * n], &ib[i * n..(i + 1) * n]);
+            let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
             for j in 0..m {
-                let (aj, bj) = (&ra[j * n..(j + 1) * n], &ib[j * n..(j + 1) * n]);
+                let (aj, bj) = (&ra[j * n..][..n], &ib[j * n..][..n]);
                 let s = 4.0 * p.gamma[0] * p.r[i] * p.r[j];
-                let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-                let mut same = s * (dot(ai, aj) + dot(bi, bj)) + 4.0 * p.coupling_gram[i * m + j];
-                let cross = s * (dot(bi, aj) - dot(ai, bj));
-                let own = if i == j { 4.0 * p.gamma[0] * p.r[i] } else { 0.0 };
-                if i == j {
-                    same += 2.0 * p.closeness[i];
+                let (mut same, mut cross) = (0.0, 0.0);
+                for a in 0..n {
+                    same += ai[a] * aj[a] + bi[a] * bj[a];
+                    cross += bi[a] * aj[a] - ai[a] * bj[a];
                 }
                 for a in 0..n {
-                    let at = (i * n + a) * width + j * n;
-                    let low = (half + i * n + a) * width + j * n;
-                    for b in 0..n {
-                        let (xr, xi) = (own * self.real[a * n + b], own * self.imaginary[a * n + b]);
-                        let (aa, bb) = (aj[a] * ai[b], bj[a] * bi[b]);
-                        let w: f64 = p.coupling.iter().map(|w| 4.0 * w[j * n + a] * w[i * n + b]).sum();
-                        let unit = if a == b { 1.0 } else { 0.0 };
-                        out[at + b] = xr + s * (aa - bb) + w + unit * same;
-                        out[low + half + b] = xr + s * (bb - aa) - w + unit * same;
-                        out[low + b] = -xi + s * (aj[a] * bi[b] + bj[a] * ai[b]) + unit * cross;
+                    let (row, column) = ((i * n + a) * width, j * n);
+                    let (sa, sb) = (s * aj[a], s * bj[a]);
+                    if j <= i {
+                        let q = (i * n + a) * half + column;
+                        let (plus, minus) = (&p.quadratic[0][q..][..n], &p.quadratic[1][q..][..n]);
+                        let aa = &mut upper[row + column..][..n];
+                        for b in 0..n {
+                            aa[b] = plus[b] + (sa * ai[b] - sb * bi[b]);
+                        }
+                        aa[a] += s * same;
+                        let bb = &mut lower[row + half + column..][..n];
+                        for b in 0..n {
+                            bb[b] = minus[b] + (sb * bi[b] - sa * ai[b]);
+                        }
+                        bb[a] += s * same;
                     }
+                    let ba = &mut lower[row + column..][..n];
+                    for b in 0..n {
+                        ba[b] = sa * bi[b] + sb * ai[b];
+                    }
+                    ba[a] += s * cross;
+                }
+            }
+            let own = 4.0 * p.gamma[0] * p.r[i];
+            for a in 0..n {
+                let (row, column) = ((i * n + a) * width, i * n);
+                for b in 0..n {
+                    let (real, imaginary) = (own * self.real[a * n + b], own * self.imaginary[a * n + b]);
+                    upper[row + column + b] += real;
+                    lower[row + half + column + b] += real;
+                    lower[row + column + b] -= imaginary;
                 }
             }
         }
     }
 
+    #[inline(always)]
     fn gradient_scale(&self, g: &[f64]) -> f64 {
         self.scales.0.max(norm(g) * f64::MIN_POSITIVE)
     }
 
     fn value_scale(&self) -> f64 {
         self.scales.1
+    }
+}
+
+widened! {
+    /// Newton on complex gains.
+    pub(super) fn minimise_complex<const N: usize, const M: usize>(
+        complex: &mut ComplexGains<N, M>,
+        g: &mut [f64],
+        variables: &[Variable],
+        limits: Limits,
+        w: &mut Workspace,
+    ) -> Reached {
+        minimise(complex, g, variables, limits, None, w)
     }
 }

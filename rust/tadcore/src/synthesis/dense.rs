@@ -12,7 +12,7 @@ const LIBRARY_SIZE: usize = 96;
 
 /// Factorises the lower triangle of the row-major `d` × `d` matrix `a` into L Lᵀ, in place; `false` when it is not
 /// positive definite to working precision.
-#[inline]
+#[inline(always)]
 pub(super) fn factorise(a: &mut [f64], d: usize) -> bool {
     if d >= LIBRARY_SIZE { factorise_large(a, d) } else { factorise_small(a, d) }
 }
@@ -44,6 +44,7 @@ fn factorise_small(a: &mut [f64], d: usize) -> bool {
     true
 }
 
+#[inline(never)]
 fn factorise_large(a: &mut [f64], d: usize) -> bool {
     // faer reads columns: the transposed view turns our lower triangle, stored by rows, into its row-strided one.
     let mut view = MatMut::from_row_major_slice_mut(&mut a[..d * d], d, d);
@@ -71,7 +72,7 @@ fn factorise_large(a: &mut [f64], d: usize) -> bool {
 }
 
 /// Solves L Lᵀ x = b in place with a factor from [`factorise`].
-#[inline]
+#[inline(always)]
 pub(super) fn solve(l: &[f64], d: usize, x: &mut [f64]) {
     for i in 0..d {
         let row = &l[i * d..i * d + i + 1];

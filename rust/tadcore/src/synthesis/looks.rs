@@ -12,11 +12,12 @@
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
 
-use super::complex::ComplexGains;
-use super::newton::{Limits, Objective, Reached, Workspace, minimise};
-use super::objective::{RealGains, norm};
+use super::complex::{ComplexGains, minimise_complex};
+use super::newton::{Limits, Objective, Reached, Rival, Workspace};
+use super::objective::{RealGains, minimise_real, norm};
 use super::problem::Problem;
 use super::start::{self, Variable};
+use crate::width::Width;
 
 /// The look that won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,14 +44,20 @@ const LOOK_ITERATIONS: usize = 300;
 const PAIRS_UP_TO: usize = 8;
 /// Rounds of reversals, each from the best point of the one before.
 const ROUNDS: usize = 4;
+/// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
+/// of them mean a narrow valley, whose floor is worth following to its end.
+const QUICK: usize = 30;
+/// Distance, relative to the best gains, at which a descent is taken to be back at them.
+const BACK: f64 = 1e-3;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 /// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
 const CERTIFICATE_ROUNDING: f64 = 1e-12;
 
 /// Scratch reused from solve to solve.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Scratch {
+    width: Width,
     pub(super) newton: Workspace,
     doubled: Vec<Variable>,
     pair: Vec<f64>,
@@ -60,12 +67,29 @@ pub(super) struct Scratch {
     restricted: Vec<f64>,
 }
 
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = Vec::new;
+        Self {
+            width: Width::detect(),
+            newton: Workspace::default(),
+            doubled: Vec::new(),
+            pair: empty(),
+            shift: empty(),
+            trial: empty(),
+            form: empty(),
+            restricted: empty(),
+        }
+    }
+}
+
 /// The best point of all looks.
 pub(super) struct Best {
     pub reached: Reached,
     pub look: Look,
     pub certified: bool,
     pub iterations: usize,
+    quick: bool,
 }
 
 /// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
@@ -78,9 +102,15 @@ pub(super) fn search<const N: usize, const M: usize>(
 ) -> Best {
     let start = g.to_vec();
     let mut real = RealGains::<N, M>::new(problem, 1);
-    let reached = minimise(&mut real, g, variables, limits, &mut s.newton);
+    let reached = minimise_real(s.width, &mut real, g, variables, limits, None, &mut s.newton);
     let certified = certify(&mut real, g, variables, s);
-    let mut best = Best { reached, look: Look::Canonical, certified, iterations: reached.iterations };
+    let mut best = Best {
+        reached,
+        look: Look::Canonical,
+        certified,
+        iterations: reached.iterations,
+        quick: reached.iterations <= QUICK,
+    };
     if certified {
         return best;
     }
@@ -108,6 +138,44 @@ pub(super) fn search<const N: usize, const M: usize>(
         best.certified = certify(&mut real, g, variables, s);
     }
     best
+}
+
+/// A problem in twice as many gains.
+trait Doubled {
+    fn descend(
+        &mut self,
+        width: Width,
+        g: &mut [f64],
+        variables: &[Variable],
+        limits: Limits,
+        w: &mut Workspace,
+    ) -> Reached;
+}
+
+impl<const N: usize, const M: usize> Doubled for ComplexGains<'_, N, M> {
+    fn descend(
+        &mut self,
+        width: Width,
+        g: &mut [f64],
+        variables: &[Variable],
+        limits: Limits,
+        w: &mut Workspace,
+    ) -> Reached {
+        minimise_complex(width, self, g, variables, limits, w)
+    }
+}
+
+impl<const N: usize, const M: usize> Doubled for RealGains<'_, N, M> {
+    fn descend(
+        &mut self,
+        width: Width,
+        g: &mut [f64],
+        variables: &[Variable],
+        limits: Limits,
+        w: &mut Workspace,
+    ) -> Reached {
+        minimise_real(width, self, g, variables, limits, None, w)
+    }
 }
 
 /// Newton from the point in `g` with one row, two rows or one variable reversed.
@@ -158,7 +226,7 @@ fn spread(len: usize, size: f64, phase: f64, out: &mut Vec<f64>) {
 }
 
 /// Descends in a doubled problem from the canonical start and comes back to the real one.
-fn look<const N: usize, const M: usize, O: Objective>(
+fn look<const N: usize, const M: usize, O: Doubled>(
     doubled: &mut O,
     name: Look,
     far: f64,
@@ -183,7 +251,7 @@ fn look<const N: usize, const M: usize, O: Objective>(
     start::advance(&mut s.pair[width..], variables, &s.shift);
     let short =
         Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale };
-    best.iterations += minimise(doubled, &mut s.pair, &s.doubled, short, &mut s.newton).iterations;
+    best.iterations += doubled.descend(s.width, &mut s.pair, &s.doubled, short, &mut s.newton).iterations;
     for sign in [0.0, 1.0, -1.0] {
         let (a, b) = s.pair.split_at(width);
         s.trial.clear();
@@ -202,7 +270,9 @@ fn finish<const N: usize, const M: usize>(
     limits: Limits,
     s: &mut Scratch,
 ) {
-    let reached = minimise(real, &mut s.trial, variables, limits, &mut s.newton);
+    let rival = Rival { g, value: best.reached.value, near: BACK * norm(g) };
+    let reached =
+        minimise_real(s.width, real, &mut s.trial, variables, limits, best.quick.then_some(rival), &mut s.newton);
     best.iterations += reached.iterations;
     if reached.value < best.reached.value - TIE * best.reached.value.abs() {
         g.copy_from_slice(&s.trial);

@@ -58,6 +58,33 @@ pub(super) struct Limits {
     pub longest: f64,
 }
 
+impl Limits {
+    fn end(&self, value: f64, slope: f64, scale: f64, iterations: usize, limit: bool) -> Reached {
+        let relative = if slope == 0.0 { 0.0 } else { slope / scale };
+        let status = match (relative <= self.acceptable, limit) {
+            (true, _) => Status::Converged,
+            (false, true) => Status::IterationLimit,
+            (false, false) => Status::Stalled,
+        };
+        Reached { value, gradient_norm: relative, iterations, status }
+    }
+}
+
+/// The best point known: a descent that only leads back to it, or cannot get below it, need not be finished.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rival<'a> {
+    pub g: &'a [f64],
+    pub value: f64,
+    /// Distance at which a descent has come back to it.
+    pub near: f64,
+}
+
+/// How much of a Newton step's predicted decrease the steps after it may add, once the prediction holds.
+const REST: f64 = 100.0;
+/// How fast predictions fall, from one step to the next, once Newton converges quadratically; in a narrow valley they
+/// fall slowly for hundreds of steps, and what they add up to cannot be foretold.
+const FALLING: f64 = 0.01;
+
 /// What a minimisation reached.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reached {
@@ -79,11 +106,17 @@ pub(super) struct Workspace {
     trial: Vec<f64>,
 }
 
+#[inline(always)]
 fn grow(buffer: &mut Vec<f64>, len: usize) -> &mut [f64] {
     if buffer.len() < len {
         buffer.resize(len, 0.0);
     }
     &mut buffer[..len]
+}
+
+#[inline(always)]
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
 }
 
 /// Damping tried per iteration before giving up; each raises μ fourfold.
@@ -92,11 +125,13 @@ const DAMPINGS: usize = 80;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
+#[inline(always)]
 pub(super) fn minimise<O: Objective>(
     objective: &mut O,
     g: &mut [f64],
     variables: &[Variable],
     limits: Limits,
+    rival: Option<Rival>,
     w: &mut Workspace,
 ) -> Reached {
     let (d, width) = (variables.len(), objective.width());
@@ -115,19 +150,18 @@ pub(super) fn minimise<O: Objective>(
     restrict(full, variables, gradient);
     let mut slope = super::objective::norm(gradient);
     let mut iterations = 0;
-    let end = |value: f64, slope: f64, scale: f64, iterations: usize, limit: bool| {
-        let relative = if slope == 0.0 { 0.0 } else { slope / scale };
-        let status = match (relative <= limits.acceptable, limit) {
-            (true, _) => Status::Converged,
-            (false, true) => Status::IterationLimit,
-            (false, false) => Status::Stalled,
-        };
-        Reached { value, gradient_norm: relative, iterations, status }
-    };
+    // Whether the last step kept its promise, and what it promised.
+    let (mut trusted, mut expected) = (false, 0.0);
     loop {
         let scale = objective.gradient_scale(g);
         if slope <= limits.tolerance * scale || iterations == limits.iterations {
-            return end(value, slope, scale, iterations, iterations == limits.iterations);
+            return limits.end(value, slope, scale, iterations, iterations == limits.iterations);
+        }
+        if let Some(rival) = rival
+            && value >= rival.value
+            && squared_distance(g, rival.g) <= rival.near * rival.near
+        {
+            return limits.end(value, slope, scale, iterations, false);
         }
         iterations += 1;
         objective.hessian(g, form);
@@ -156,6 +190,14 @@ pub(super) fn minimise<O: Objective>(
             }
             let inner: f64 = step.iter().zip(gradient.iter()).map(|(s, g)| s * g).sum();
             let predicted = -0.5 * (inner - damping * length2);
+            if let Some(rival) = rival
+                && trusted
+                && damping == 0.0
+                && predicted < FALLING * expected
+                && value - REST * predicted > rival.value
+            {
+                return limits.end(value, slope, scale, iterations, false);
+            }
             trial.copy_from_slice(g);
             advance(trial, variables, step);
             let next = objective.value(trial);
@@ -174,6 +216,8 @@ pub(super) fn minimise<O: Objective>(
                             damping = 0.0;
                         }
                     }
+                    trusted = damping == 0.0 && (actual - predicted).abs() <= 0.25 * predicted;
+                    expected = predicted;
                     (value, slope, accepted) = (next, next_slope, true);
                     break;
                 }
@@ -186,7 +230,7 @@ pub(super) fn minimise<O: Objective>(
         if !accepted {
             value = objective.value(g);
             let scale = objective.gradient_scale(g);
-            return end(value, slope, scale, iterations, false);
+            return limits.end(value, slope, scale, iterations, false);
         }
     }
 }

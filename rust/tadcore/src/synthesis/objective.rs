@@ -17,8 +17,10 @@
 //! player's: X = Σ_c G_cᵀRG_c − M, and only G₁ is compared with F. With enough copies this is the convex relaxation of
 //! the problem (its minimum bounds Θ from below); with two it is a smooth way out of most local minima.
 
-use super::newton::Objective;
+use super::newton::{Limits, Objective, Reached, Rival, Workspace, minimise};
 use super::problem::Problem;
+use super::start::Variable;
+use crate::width::widened;
 
 /// Θ over real gains, or over a stack of them. `N` and `M` are the size and the constrained players, both 0 when they
 /// are known only at run time.
@@ -31,8 +33,6 @@ pub(super) struct RealGains<'a, const N: usize, const M: usize> {
     delta: Vec<f64>,
     /// E_p, N × N each, for each copy.
     coupled: Vec<f64>,
-    /// Q, mN × mN.
-    quadratic: Vec<f64>,
     /// 4 Σ‖W_p‖² and the other factors of the gradient's scale.
     scale: Scale,
 }
@@ -46,6 +46,7 @@ struct Scale {
     weight: f64,
 }
 
+#[inline(always)]
 pub(super) fn norm(x: &[f64]) -> f64 {
     x.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
@@ -60,17 +61,14 @@ impl<'a, const N: usize, const M: usize> RealGains<'a, N, M> {
             closeness: problem.closeness.iter().fold(0.0, |a: f64, &b| a.max(b)),
             weight: problem.r.iter().fold(0.0, |a: f64, &b| a.max(b)),
         };
-        let mut this = Self {
+        Self {
             problem,
             copies,
             x: vec![0.0; n * n],
             delta: vec![0.0; copies * m * n],
             coupled: vec![0.0; copies * problem.coupling.len() * n * n],
-            quadratic: vec![0.0; m * n * m * n],
             scale,
-        };
-        this.fill_quadratic();
-        this
+        }
     }
 
     #[inline(always)]
@@ -78,35 +76,11 @@ impl<'a, const N: usize, const M: usize> RealGains<'a, N, M> {
         if N > 0 { (N, M) } else { (self.problem.size, self.problem.rows) }
     }
 
-    #[inline(always)]
-    fn fill_quadratic(&mut self) {
-        let (n, m) = self.dimensions();
-        let width = m * n;
-        for i in 0..m {
-            for j in 0..=i {
-                let mut diagonal = 4.0 * self.problem.coupling_gram[i * m + j];
-                if i == j {
-                    diagonal += 2.0 * self.problem.closeness[i];
-                }
-                for a in 0..n {
-                    let row = &mut self.quadratic[(i * n + a) * width + j * n..][..n];
-                    for w in &self.problem.coupling {
-                        let factor = 4.0 * w[j * n + a];
-                        for (x, wi) in row.iter_mut().zip(&w[i * n..(i + 1) * n]) {
-                            *x += factor * wi;
-                        }
-                    }
-                    row[a] += diagonal;
-                }
-            }
-        }
-    }
-
     /// Adds 4γ₁ δ_ij r_i X to the constant part: the form whose definiteness certifies the point last evaluated.
     pub(super) fn certificate_form(&self, out: &mut [f64]) {
         let (n, m) = self.dimensions();
         let width = m * n;
-        out[..width * width].copy_from_slice(&self.quadratic);
+        out[..width * width].copy_from_slice(&self.problem.quadratic[0]);
         for i in 0..m {
             let factor = 4.0 * self.problem.gamma[0] * self.problem.r[i];
             for a in 0..n {
@@ -120,6 +94,7 @@ impl<'a, const N: usize, const M: usize> RealGains<'a, N, M> {
 }
 
 impl<const N: usize, const M: usize> Objective for RealGains<'_, N, M> {
+    #[inline(always)]
     fn width(&self) -> usize {
         let (n, m) = self.dimensions();
         self.copies * n * m
@@ -230,7 +205,7 @@ impl<const N: usize, const M: usize> Objective for RealGains<'_, N, M> {
         let p = self.problem;
         let (n, m) = self.dimensions();
         let single = m * n;
-        let (r, x, quadratic) = (&p.r[..m], &self.x[..n * n], &self.quadratic[..single * single]);
+        let (r, x, quadratic) = (&p.r[..m], &self.x[..n * n], &p.quadratic[0][..single * single]);
         let width = self.copies * single;
         for (upper, lower) in (0..self.copies).flat_map(|u| (0..=u).map(move |l| (u, l))) {
             let (gu, gl) = (&g[upper * single..][..single], &g[lower * single..][..single]);
@@ -274,6 +249,7 @@ impl<const N: usize, const M: usize> Objective for RealGains<'_, N, M> {
         }
     }
 
+    #[inline(always)]
     fn gradient_scale(&self, g: &[f64]) -> f64 {
         let (s, size) = (&self.scale, norm(g));
         let quartic = 4.0 * self.problem.gamma[0] * s.weight * size * (norm(&self.x) + 2.0 * s.target);
@@ -283,5 +259,19 @@ impl<const N: usize, const M: usize> Objective for RealGains<'_, N, M> {
     fn value_scale(&self) -> f64 {
         let s = &self.scale;
         self.problem.gamma[0] * s.target * s.target + (4.0 * s.coupling + s.closeness) * s.fne * s.fne
+    }
+}
+
+widened! {
+    /// Newton on real or stacked gains.
+    pub(super) fn minimise_real<const N: usize, const M: usize>(
+        real: &mut RealGains<N, M>,
+        g: &mut [f64],
+        variables: &[Variable],
+        limits: Limits,
+        rival: Option<Rival>,
+        w: &mut Workspace,
+    ) -> Reached {
+        minimise(real, g, variables, limits, rival, w)
     }
 }

@@ -28,6 +28,9 @@ pub struct Problem {
     pub(super) coupling_gram: Vec<f64>,
     /// c_i.
     pub(super) closeness: Vec<f64>,
+    /// The Hessian's constant part 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** with + and with −, mN × mN;
+    /// blocks on and below the diagonal.
+    pub(super) quadratic: [Vec<f64>; 2],
 }
 
 impl Problem {
@@ -76,7 +79,7 @@ impl Problem {
                 }
             }
         }
-        let closeness = (0..rows)
+        let closeness: Vec<f64> = (0..rows)
             .map(|i| {
                 let term = match interaction {
                     Interaction::I1 => 3,
@@ -85,7 +88,8 @@ impl Problem {
                 gamma[term] * r[i] * r[i]
             })
             .collect();
-        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness }
+        let quadratic = [1.0, -1.0].map(|sign| constant(size, sign, &coupling, &coupling_gram, &closeness));
+        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness, quadratic }
     }
 
     /// N.
@@ -147,4 +151,28 @@ impl Problem {
     pub fn weigh(&self, terms: &[f64]) -> f64 {
         self.gamma.iter().zip(terms).map(|(g, t)| g * t).sum()
     }
+}
+
+/// The constant part of the Hessian, by the sign of its second term.
+fn constant(n: usize, sign: f64, coupling: &[Vec<f64>], gram: &[f64], closeness: &[f64]) -> Vec<f64> {
+    let m = closeness.len();
+    let width = m * n;
+    let mut out = vec![0.0; width * width];
+    for i in 0..m {
+        for j in 0..=i {
+            let own = if i == j { 2.0 * closeness[i] } else { 0.0 };
+            let diagonal = 4.0 * gram[i * m + j] + own;
+            for a in 0..n {
+                let row = &mut out[(i * n + a) * width + j * n..][..n];
+                for w in coupling {
+                    let factor = 4.0 * sign * w[j * n + a];
+                    for (x, wi) in row.iter_mut().zip(&w[i * n..(i + 1) * n]) {
+                        *x += factor * wi;
+                    }
+                }
+                row[a] += diagonal;
+            }
+        }
+    }
+    out
 }

@@ -70,6 +70,7 @@ pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
 }
 
 /// Adds Σ x_v · direction_v to the gains.
+#[inline(always)]
 pub(super) fn advance(g: &mut [f64], variables: &[Variable], x: &[f64]) {
     for (v, &x) in variables.iter().zip(x) {
         g[v.entry] += x;
@@ -80,6 +81,7 @@ pub(super) fn advance(g: &mut [f64], variables: &[Variable], x: &[f64]) {
 }
 
 /// Restricts a gradient with respect to the m × N gains to the variables.
+#[inline(always)]
 pub(super) fn restrict(full: &[f64], variables: &[Variable], out: &mut [f64]) {
     for (v, x) in variables.iter().zip(out) {
         *x = full[v.entry] - if v.relative { full[v.own] } else { 0.0 };
@@ -87,6 +89,7 @@ pub(super) fn restrict(full: &[f64], variables: &[Variable], out: &mut [f64]) {
 }
 
 /// Restricts a quadratic form on the m × N gains (`width` = mN, row-major) to the variables; lower triangle of `out`.
+#[inline(always)]
 pub(super) fn restrict_form(full: &[f64], width: usize, variables: &[Variable], out: &mut [f64], stride: usize) {
     for (a, va) in variables.iter().enumerate() {
         for (b, vb) in variables[..=a].iter().enumerate() {
