@@ -1,0 +1,321 @@
+"""A study: many games around one scenario, drawn, played in chunks, kept and counted.
+
+The trials of a study are numbered. What trial i plays and how it ends depend on the scenario, on what varies, on the
+seed and on i alone: not on the number of threads, the executor, the length of the study, or how often it was cut off.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from ._arrays import as_index
+from ._chunks import Plan
+from ._design import CHUNK, DESIGNS, Design
+from ._game import game_of
+from ._progress import Progress
+from ._samplers import as_sampler
+from ._schedule import LostWorkerError, computed
+from ._table import schema_of, table_of
+from ._vary import Quantity, normal
+from .errors import ScenarioError, WorkerError
+from .outcome import OutcomeKind
+from .result import StudyResult, load_study
+from .sampling import Sampler
+from .scenario import Scenario
+from .store import Manifest, Store
+
+__all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
+
+_MOST_TRIALS = 2**32  # points of the Sobol' sequence
+
+
+@runtime_checkable
+class StoppingRule(Protocol):
+    """When a study has seen enough, such as `tadcore.statistics.HalfWidth`."""
+
+    def satisfied(self, counts: NDArray[np.int64], trials: int) -> bool:
+        """Whether the counts of the outcomes, by `OutcomeKind`, after so many trials are enough."""
+        ...
+
+
+class Study:
+    """Many games around one scenario.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game; what does not vary is as it says.
+    vary : mapping of str to sampler
+        Paths of positions, visibility radii and capture radii, such as ``"attacker.position"``,
+        ``"defenders.0.visibility_radius"``, ``"defenders.*.capture_radius"`` or ``"*.position"``, and how to draw
+        them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
+        ``f(rng, size)``. With a wildcard every player draws for itself.
+    trials : int
+        How many games.
+    seed : int
+        Any whole number in [0, 2⁶⁴); adjacent seeds share nothing.
+    design : {"random", "sobol", "latin"}
+        Independent draws, a scrambled Sobol' sequence, or Latin hypercubes (one for every chunk of 8,192 trials).
+
+    Raises
+    ------
+    ScenarioError
+        A path leads nowhere or to a weight, a sampler does not fit, there are no trials.
+
+    Notes
+    -----
+    The draws of the random design come from ``numpy.random.Philox``, keyed by (seed, chunk) and with the varied
+    quantity in the counter; with one seed, two studies that vary the same position draw the same positions, whatever
+    else they vary. A callable must be a function of its arguments alone. A store knows it by its qualified name and a
+    digest of its source.
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> from tadcore.sampling import Disk
+    >>> sc = tadcore.scenarios.load("paper-i1")
+    >>> result = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 0.5)}, trials=50, seed=7).run()
+    >>> result.trials, sum(result.counts().values())
+    (50, 50)
+    >>> result.replay(3).outcome.time == result.time[3]
+    np.True_
+    """
+
+    def __init__(
+        self,
+        sc: Scenario,
+        vary: Mapping[str, Any],
+        *,
+        trials: int,
+        seed: int = 0,
+        design: Design = "random",
+    ) -> None:
+        if not isinstance(sc, Scenario):
+            raise ScenarioError("sc", sc, "a tadcore.Scenario")
+        if not isinstance(vary, Mapping) or not vary:
+            example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
+            raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
+        if design not in DESIGNS:
+            raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
+        self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
+        samplers: dict[str, Sampler] = {}
+        for path, value in vary.items():
+            name = normal(path)
+            if name in samplers:
+                raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
+            samplers[name] = as_sampler(f'vary["{path}"]', value)
+        self._plan = Plan(sc, samplers, as_index("seed", seed, 2**64 - 1), design)
+        for quantity, sampler in self._plan.varied:
+            if design != "random" and not sampler.by_points:
+                rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
+                raise ScenarioError(f'vary["{quantity.path}"]', sampler.table(), rule)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario around which the inputs vary."""
+        return self._plan.scenario
+
+    @property
+    def vary(self) -> Mapping[str, Sampler]:
+        """The sampler of every path."""
+        return MappingProxyType(self._plan.vary)
+
+    @property
+    def seed(self) -> int:
+        """The seed."""
+        return self._plan.seed
+
+    @property
+    def design(self) -> Design:
+        """The design of the draws."""
+        return self._plan.design
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What varies, wildcards expanded."""
+        return self._plan.quantities
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, one for each varied component."""
+        return self._plan.columns
+
+    def inputs(self, trials: int | None = None) -> dict[str, NDArray[np.float64]]:
+        """Draw without playing: the inputs of the first trials, all of them by default, by the name of the column.
+
+        Parameters
+        ----------
+        trials : int, optional
+            How many.
+        """
+        wanted = self.trials if trials is None else as_index("trials", trials, self.trials, least=1)
+        drawn = [self._plan.draw(chunk, rows) for chunk, rows in _jobs(wanted)]
+        return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
+
+    def replace(self, **changes: Any) -> Study:
+        """Another study with some of ``sc``, ``vary``, ``trials``, ``seed`` and ``design`` changed."""
+        given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
+        return Study(**{"sc": self.scenario, "design": self.design, **given, **changes})
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Study:
+        """Read a study file; raises `ScenarioError` for a file, a key or a value that cannot be accepted."""
+        from ._study_toml import read_study
+
+        return read_study(path)
+
+    def run(
+        self,
+        *,
+        progress: bool | str = False,
+        store: str | os.PathLike[str] | None = None,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        until: StoppingRule | None = None,
+    ) -> StudyResult:
+        """Play the trials.
+
+        Parameters
+        ----------
+        progress : bool or str
+            Show a bar with the rate and running estimates, in a terminal or a notebook; a string stands before it.
+        store : path, optional
+            A folder that keeps every finished chunk. If it holds this study already, the run goes on from there; a
+            larger ``trials`` extends it.
+        threads : int, optional
+            Threads for each chunk; all cores by default, or 1 in the workers of an executor.
+        executor : concurrent.futures.Executor, optional
+            Who computes the chunks: a process pool, Dask's ``client.get_executor()``, ``MPIPoolExecutor``. By default
+            this process does, one chunk after another.
+        until : StoppingRule, optional
+            Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
+
+        Returns
+        -------
+        StudyResult
+            The same to the bit for any number of threads, any executor and any interruptions.
+
+        Raises
+        ------
+        ScenarioError
+            A draw is no game: the path, the trial and the value are named. The first chunk is checked before anything
+            runs, and so are the first million trials unless the samplers' supports prove them right.
+        NoEquilibriumError
+            The game has no equilibrium on [0, T].
+        StoreError
+            The store is another study's, in use, damaged, or cannot be written.
+        WorkerError
+            A worker of the executor died; what was finished is in the store.
+        KeyboardInterrupt
+            Ctrl-C; what was finished is in the store.
+        """
+        workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
+        if executor is not None and not isinstance(executor, Executor):
+            hint = ": client.get_executor()" if hasattr(executor, "get_executor") else ""
+            raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")
+        if until is not None and not isinstance(until, StoppingRule):
+            raise ScenarioError("until", until, "a stopping rule such as tadcore.statistics.HalfWidth(0.002)")
+        self._plan.check_ahead(self.trials)
+        game_of(self.scenario).equilibrium()
+        schema = schema_of(self.columns)
+        opened = contextlib.nullcontext() if store is None else Store.writing(store, self._manifest(), schema)
+        with opened as kept, Progress(self.trials, wanted=progress) as bar:
+            return StudyResult(self, self._collect(kept, bar, schema, executor, workers, until))
+
+    def _manifest(self) -> Manifest:
+        return Manifest(
+            scenario=self.scenario.to_toml(),
+            vary={path: sampler.table() for path, sampler in self.vary.items()},
+            seed=self.seed,
+            design=self.design,
+            trials=self.trials,
+            columns=self.columns,
+        )
+
+    def _collect(
+        self,
+        store: Store | None,
+        bar: Progress,
+        schema: pa.Schema,
+        executor: Executor | None,
+        threads: int | None,
+        until: StoppingRule | None,
+    ) -> pa.Table:
+        """Every chunk from the store or computed, in order, up to where the rule holds."""
+        jobs = _jobs(self.trials)
+        gathered = _Gathered(until)
+        left = []
+        for chunk, rows in jobs:
+            if store is not None and store.rows.get(chunk, 0) >= rows:
+                bar.add(gathered.add(chunk, store.read(chunk).slice(0, rows)), stored=True)
+            else:
+                left.append((chunk, rows))
+        if store is not None:
+            store.stop(gathered.stopped)
+        if gathered.stopped is None and left:
+            try:
+                with contextlib.closing(computed(self._plan, left, executor, threads)) as results:
+                    for chunk, outcomes in results:
+                        table = table_of(chunk, outcomes, schema)
+                        if store is not None:
+                            store.write(chunk, table)
+                        bar.add(gathered.add(chunk, table))
+                        if gathered.stopped is not None:
+                            break
+            except LostWorkerError as error:
+                place = None if store is None else str(store.folder)
+                raise WorkerError(str(error), len(gathered.tables), len(jobs), place) from error.__cause__
+        if store is not None:
+            store.stop(gathered.stopped)
+        return gathered.table()
+
+    def __repr__(self) -> str:
+        paths = ", ".join(self.vary)
+        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"
+
+
+class _Gathered:
+    """Chunks as they come, looked at in their order."""
+
+    def __init__(self, until: StoppingRule | None) -> None:
+        self.tables: dict[int, pa.Table] = {}
+        self.stopped: int | None = None
+        self._until = until
+        self._looked = 0
+        self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
+
+    def add(self, chunk: int, table: pa.Table) -> NDArray[np.int64]:
+        """Keep a chunk and return its counts; ask the rule after every chunk before which none is missing."""
+        self.tables[chunk] = table
+        if self._until is not None:
+            while self.stopped is None and self._looked in self.tables:
+                self._counts += _counts(self.tables[self._looked])
+                self._looked += 1
+                trials = int(self._counts.sum())
+                if self._until.satisfied(self._counts.copy(), trials):
+                    self.stopped = trials
+        return _counts(table)
+
+    def table(self) -> pa.Table:
+        """All chunks in one table, or those up to where the rule held."""
+        last = self._looked if self.stopped is not None else len(self.tables)
+        return pa.concat_tables([self.tables[chunk] for chunk in range(last)]).combine_chunks()
+
+
+def _counts(table: pa.Table) -> NDArray[np.int64]:
+    return np.bincount(table["kind"].to_numpy(), minlength=len(OutcomeKind)).astype(np.int64)
+
+
+def _jobs(trials: int) -> list[tuple[int, int]]:
+    """Every chunk with the number of its trials."""
+    return [(chunk, min(CHUNK, trials - chunk * CHUNK)) for chunk in range(math.ceil(trials / CHUNK))]
