@@ -85,12 +85,12 @@ class Plan:
                     good, rule = values > 0.0, "a positive number, or inf"
                 self._refuse(chunk, quantity.columns[part], values, ~good, rule)
                 column += 1
-        _, sight, capture = setups(self.scenario, self.quantities, inputs[:, :])
+        _, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
-            rule = "larger than the capture radius of this defender"
+            rule = "larger than the defender's capture radius"
             bad = capture[:, i] >= sight[:, i]
             if bad.any():
-                rule += f", {capture[int(bad.argmax()), i]!r}"
+                rule += f", {float(capture[int(bad.argmax()), i])!r}"
             self._refuse(chunk, f"defenders.{i}.visibility_radius", sight[:, i], bad, rule)
 
     def check_ahead(self, trials: int) -> None:
@@ -123,7 +123,7 @@ class Plan:
     def _refuse(self, chunk: int, path: str, values: NDArray[np.float64], bad: NDArray[np.bool_], rule: str) -> None:
         if bad.any():
             row = int(bad.argmax())
-            raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), f"{rule}")
+            raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), rule)
 
     def run(self, chunk: int, rows: int, threads: int | None) -> Outcomes:
         """Draw, check and play the first ``rows`` trials of a chunk."""

@@ -119,7 +119,9 @@ class Box(_Parameters):
             raise ScenarioError("Box.high", self.high, f"{low.size} numbers, as Box.low is")
         if not np.all(low <= high):
             raise ScenarioError("Box.high", self.high, f"nowhere below Box.low ({self.low})")
-        if not np.isfinite(high - low).all():
+        with np.errstate(over="ignore"):
+            width = high - low
+        if not np.isfinite(width).all():
             raise ScenarioError("Box.high", self.high, "so near to Box.low that the difference is a finite number")
 
     def check(self, field: str, components: int) -> None:
@@ -284,7 +286,8 @@ class _Listed(_Parameters):
             array = np.asarray(self.values, dtype=np.float64)
         except (TypeError, ValueError):
             raise ScenarioError(name, self.values, rule) from None
-        if array.ndim not in (1, 2) or not array.size or np.asarray(self.values).dtype.kind not in "iuf":
+        numbers = np.asarray(self.values).dtype.kind in "iuf" and not np.isnan(array).any()
+        if array.ndim not in (1, 2) or not array.size or not numbers:
             raise ScenarioError(name, self.values, rule)
         self._keep("values", tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist()))
 
