@@ -13,6 +13,8 @@ from .outcome import OutcomeKind
 
 __all__ = ["Progress"]
 
+_FORMAT = "{desc}|{bar}| {n_fmt}/{total_fmt} [{remaining}, {rate_fmt}{postfix}]"
+
 
 class Progress:
     """A bar over trials.
@@ -32,7 +34,7 @@ class Progress:
             from tqdm.auto import tqdm
 
             label = wanted if isinstance(wanted, str) else None
-            self._bar = tqdm(total=total, desc=label, unit=" trials", unit_scale=True, dynamic_ncols=True)
+            self._bar = tqdm(total=total, desc=label, unit="", unit_scale=True, dynamic_ncols=True, bar_format=_FORMAT)
 
     def add(self, counts: NDArray[np.int64], *, stored: bool = False) -> None:
         """Count the outcomes of a chunk; those from a store do not enter the rate."""
@@ -45,8 +47,10 @@ class Progress:
             self._bar.n += rows
         estimates = self._counts / max(int(self._counts.sum()), 1)
         order = (OutcomeKind.INTERCEPTED, OutcomeKind.CAPTURED, OutcomeKind.TIMEOUT)
-        text = ", ".join(f"P({kind.name.lower()})={estimates[kind]:.4f}" for kind in order)
-        self._bar.set_postfix_str(text, refresh=stored)
+        # "P(kind)" without its letters: the line has to fit into 80 columns, rate and all.
+        self._bar.set_postfix_str(
+            " ".join(f"{kind.name.lower()} {estimates[kind]:.3f}" for kind in order), refresh=stored
+        )
         if not stored:
             self._bar.update(rows)
 

@@ -148,8 +148,12 @@ def sweep(
         Show a bar for each cell, in a terminal or a notebook.
     store : path, optional
         A folder with a store for each cell; run again, the sweep goes on, and a larger grid adds to it.
-    threads, executor, until
+    threads : int, optional
         As in `Study.run`.
+    executor : concurrent.futures.Executor, optional
+        As in `Study.run`.
+    until : StoppingRule, optional
+        As in `Study.run`, for each cell.
 
     Returns
     -------

@@ -1,6 +1,7 @@
 """Stores: killed, continued, extended, shared, damaged and full; the outcomes are always those of one clean run."""
 
 import json
+import multiprocessing
 import os
 import resource
 import shutil
@@ -108,6 +109,26 @@ def test_kill_9_loses_only_what_was_in_flight(tmp_path):
     assert not list(folder.glob(".*"))
 
 
+FORKED = """
+import concurrent.futures, multiprocessing, sys
+from study_cases import CHUNK, study
+with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
+    study(40 * CHUNK).run(store=sys.argv[1], executor=pool)
+"""
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system does not fork")
+def test_workers_that_outlive_a_killed_run_do_not_hold_its_store(tmp_path):
+    folder = tmp_path / "store"
+    with subprocess.Popen([sys.executable, "-c", FORKED, folder], cwd=HERE, start_new_session=True) as process:
+        while process.poll() is None and not parts(folder):
+            time.sleep(0.005)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        assert study(CHUNK).run(store=folder).trials == CHUNK
+        os.killpg(process.pid, signal.SIGKILL)  # the worker is still there
+
+
 def test_finished_chunks_are_not_played_again(copied, clean, monkeypatch):
     monkeypatch.setattr("tadcore._chunks.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
     assert study().run(store=copied).table.equals(clean[0].table)
@@ -206,7 +227,9 @@ def test_a_foreign_part_is_named(copied, tmp_path):
     shutil.copy(copied / "part-000001.parquet", copied / "part-000000.parquet")
     with pytest.raises(StoreError, match=r"part-000000\.parquet: it holds chunk 1, not 0"):
         tadcore.load_study(copied)
-    pq.write_table(pq.read_table(copied / "part-000001.parquet").replace_schema_metadata(None), copied / "part-000000.parquet")
+    pq.write_table(
+        pq.read_table(copied / "part-000001.parquet").replace_schema_metadata(None), copied / "part-000000.parquet"
+    )
     with pytest.raises(StoreError, match=r"part-000000\.parquet: it belongs to no study"):
         tadcore.load_study(copied)
     (copied / "part-000000.parquet").rename(copied / "part-mine.parquet")
@@ -214,9 +237,7 @@ def test_a_foreign_part_is_named(copied, tmp_path):
         tadcore.load_study(copied)
 
 
-@pytest.mark.parametrize(
-    ("drop", "words"), [(["time"], "its columns are"), ([], r"it has 8191 rows, and says 8192")]
-)
+@pytest.mark.parametrize(("drop", "words"), [(["time"], "its columns are"), ([], r"it has 8191 rows, and says 8192")])
 def test_a_part_with_other_columns_or_rows_is_named(copied, drop, words):
     path = copied / "part-000000.parquet"
     table = pq.read_table(path)
