@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import inspect
 import math
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._design import generator
 from .errors import MISSING, ScenarioError
 from .sampling import Annulus, Block, Box, Choice, Cycle, Disk, Gaussian, Sampler
 
@@ -21,6 +23,7 @@ _BUILT_IN: dict[str, type[Sampler]] = {
     kind.__name__.lower(): kind for kind in (Annulus, Box, Choice, Cycle, Disk, Gaussian)
 }
 _KINDS = (*_BUILT_IN, "values", "scipy")
+_PROBE = 64  # draws that identify what has no parameters to be known by
 _RULE = "a sampler: one of tadcore.sampling, a frozen scipy.stats distribution, a sequence, or a callable f(rng, size)"
 
 
@@ -29,6 +32,9 @@ class Quantiles(Sampler):
 
     def __init__(self, distribution: Any) -> None:
         self.distribution = distribution
+
+    def __repr__(self) -> str:
+        return f"<{_name(getattr(self.distribution, 'dist', self.distribution))}>"
 
     def check(self, field: str, components: int) -> None:
         """Refuse parameters with another number of coordinates."""
@@ -51,14 +57,13 @@ class Quantiles(Sampler):
     def table(self) -> dict[str, Any]:
         """Name and parameters for a distribution of SciPy, a description for any other."""
         frozen = self.distribution
-        if not hasattr(frozen, "dist"):
-            return {"distribution": repr(frozen)}
+        if getattr(getattr(frozen, "dist", None), "name", None) not in _distributions():
+            values = self.draw(Block(np.linspace(0.0, 1.0, 66)[1:-1, None], np.random.default_rng(0), 0), 1)
+            return {"distribution": _name(getattr(frozen, "dist", frozen)), "draws": _digest(values)}
         names = _parameters(frozen.dist)
         given = {**dict(zip(names, frozen.args, strict=False)), **frozen.kwds}
         parameters = {name: np.asarray(value, dtype=np.float64).tolist() for name, value in sorted(given.items())}
-        if frozen.dist.name in _distributions():
-            return {"scipy": frozen.dist.name, **parameters}
-        return {"distribution": _identity(type(frozen.dist)), **parameters}
+        return {"scipy": frozen.dist.name, **parameters}
 
 
 class Variates(Sampler):
@@ -69,6 +74,9 @@ class Variates(Sampler):
     def __init__(self, distribution: Any) -> None:
         self.distribution = distribution
 
+    def __repr__(self) -> str:
+        return f"<{_name(self.distribution)}>"
+
     def coordinates(self, components: int) -> int:
         """None: it draws from the stream."""
         return 0
@@ -76,13 +84,12 @@ class Variates(Sampler):
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """Whole chunks of variates."""
         values = self.distribution.rvs(size=len(block.points), random_state=block.rng)
-        return _shaped(repr(type(self.distribution).__name__), values, len(block.points), components)
+        return _shaped(_name(self.distribution), values, len(block.points), components)
 
     def table(self) -> dict[str, Any]:
-        """Class and parameters."""
-        kept = {k: v for k, v in sorted(vars(self.distribution).items()) if isinstance(v, float | int | np.ndarray)}
-        parameters = {name: np.asarray(value, dtype=np.float64).tolist() for name, value in kept.items()}
-        return {"distribution": type(self.distribution).__name__, **parameters}
+        """The class, and a digest of what it draws."""
+        values = self.distribution.rvs(size=_PROBE, random_state=generator(0, 0, 0))
+        return {"distribution": _name(self.distribution), "draws": _digest(values)}
 
 
 class Function(Sampler):
@@ -92,6 +99,9 @@ class Function(Sampler):
 
     def __init__(self, function: Callable[[np.random.Generator, int], Any]) -> None:
         self.function = function
+
+    def __repr__(self) -> str:
+        return f"<{_name(self.function)}>"
 
     def coordinates(self, components: int) -> int:
         """None: it draws from the stream."""
@@ -103,8 +113,15 @@ class Function(Sampler):
         return _shaped(_name(self.function), self.function(block.rng, size), size, components)
 
     def table(self) -> dict[str, Any]:
-        """The qualified name and, where there is one, a digest of the source."""
-        return {"callable": _identity(self.function)}
+        """The qualified name, digests of the source, where there is one, and of what it draws.
+
+        The source alone does not tell two closures apart.
+        """
+        table = {"callable": _name(self.function), "draws": _digest(self.function(generator(0, 0, 0), _PROBE))}
+        with contextlib.suppress(OSError, TypeError):  # no source, or none that Python can find
+            source = inspect.getsource(self.function)
+            table["source"] = hashlib.sha256(source.encode()).hexdigest()[:16]
+        return table
 
 
 class Unavailable(Sampler):
@@ -243,13 +260,9 @@ def _name(thing: Any) -> str:
     return f"{target.__module__}.{target.__qualname__}"
 
 
-def _identity(thing: Any) -> str:
-    """A qualified name, and a digest of the source where Python can find it."""
-    try:
-        source = inspect.getsource(thing if hasattr(thing, "__qualname__") else type(thing))
-    except (OSError, TypeError):
-        return _name(thing)
-    return f"{_name(thing)} sha256:{hashlib.sha256(source.encode()).hexdigest()[:16]}"
+def _digest(values: Any) -> str:
+    """A digest of values that the last bits, which differ between machines, do not change."""
+    return hashlib.sha256(np.asarray(values, dtype=np.float32).tobytes()).hexdigest()[:16]
 
 
 def as_plain(value: Any) -> Any:

@@ -80,7 +80,7 @@ def _told(plan: Plan, chunk: int | None = None) -> Iterator[None]:
         for path, sampler in plan.vary.items():
             if _of_pickling(error) and not _travels(sampler):
                 rule = "a sampler that can be sent to another process: a callable defined at the top of a module"
-                raise ScenarioError(f'vary["{path}"]', sampler.table(), rule) from error
+                raise ScenarioError(f'vary["{path}"]', sampler, rule) from error
         if chunk is not None:
             error.add_note(f"(while computing chunk {chunk} of the study)")
         raise

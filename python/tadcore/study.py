@@ -2,6 +2,21 @@
 
 The trials of a study are numbered. What trial i plays and how it ends depend on the scenario, on what varies, on the
 seed and on i alone: not on the number of threads, the executor, the length of the study, or how often it was cut off.
+
+Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
+
+.. code-block:: python
+
+    with concurrent.futures.ProcessPoolExecutor() as pool:                   # the cores of this machine
+        study.run(executor=pool, store="out")
+
+    with distributed.Client("tcp://scheduler:8786") as client:               # a Dask cluster
+        study.run(executor=client.get_executor(), store="out")
+
+    with mpi4py.futures.MPIPoolExecutor() as pool:                           # mpiexec -n 64 python -m mpi4py.futures
+        study.run(executor=pool, store="out")
+
+Every worker process builds its own table of gains. The store is written by the process that calls `Study.run`.
 """
 
 from __future__ import annotations
@@ -76,8 +91,9 @@ class Study:
     -----
     The draws of the random design come from ``numpy.random.Philox``, keyed by (seed, chunk) and with the varied
     quantity in the counter; with one seed, two studies that vary the same position draw the same positions, whatever
-    else they vary. A callable must be a function of its arguments alone. A store knows it by its qualified name and a
-    digest of its source.
+    else they vary. A callable must be a function of its arguments alone. A store knows it by its qualified name and
+    digests of its source and of a few of its draws. Disks, annuli and quantiles round as the mathematical library of
+    the machine does: on another kind of machine the last bit of a draw may differ.
 
     Examples
     --------
@@ -118,7 +134,7 @@ class Study:
         for quantity, sampler in self._plan.varied:
             if design != "random" and not sampler.by_points:
                 rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
-                raise ScenarioError(f'vary["{quantity.path}"]', sampler.table(), rule)
+                raise ScenarioError(f'vary["{quantity.path}"]', sampler, rule)
 
     @property
     def scenario(self) -> Scenario:
