@@ -5,8 +5,9 @@
 >>> print(run.outcome)
 d1 intercepts the attacker at t = 1.395
 
-A `Scenario` says what is played; `solve_equilibrium`, `synthesize`, `simulate` and `simulate_batch` compute. Bad input
-raises `ScenarioError`, a game without an equilibrium `NoEquilibriumError`.
+A `Scenario` says what is played; `solve_equilibrium`, `synthesize`, `simulate` and `simulate_batch` compute; a `Study`
+draws, plays and keeps as many games as one likes, and `sweep` repeats it over weights. Bad input raises
+`ScenarioError`, a game without an equilibrium `NoEquilibriumError`.
 """
 
 from __future__ import annotations

@@ -22,78 +22,21 @@ arguments alone, and serves the random design only. With a wildcard path every p
 
 from __future__ import annotations
 
-import abc
 import math
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from ._sampler import Block, Parameters, Sampler, covariance, listed, numbers, positive
 from .errors import ScenarioError
 
 __all__ = ["Annulus", "Block", "Box", "Choice", "Cycle", "Disk", "Gaussian", "Sampler"]
 
 
-class Block(NamedTuple):
-    """What a sampler draws from: one chunk of trials."""
-
-    points: NDArray[np.float64]
-    """Points of the open unit cube, shape (trials, coordinates)."""
-    rng: np.random.Generator
-    """The stream of this chunk and quantity, for samplers that cannot use points."""
-    first: int
-    """Number of the first trial."""
-
-
-class Sampler(abc.ABC):
-    """What `tadcore.Study` asks of a sampler; ``components`` is dim for a position and 1 for a radius."""
-
-    by_points: ClassVar[bool] = True
-    """Whether values come from the points alone; otherwise only the random design can use it."""
-
-    def coordinates(self, components: int) -> int:
-        """How many coordinates of the unit cube one trial takes."""
-        return components
-
-    @abc.abstractmethod
-    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
-        """Values of shape (trials, components)."""
-
-    def check(self, field: str, components: int) -> None:  # noqa: B027 (what has no own shape fits everything)
-        """Raise `ScenarioError` where the sampler does not fit the quantity that ``field`` names."""
-
-    def bounds(self) -> tuple[float, float]:
-        """A smallest and a largest value of any component; NaN where nothing is known."""
-        return math.nan, math.nan
-
-    @abc.abstractmethod
-    def table(self) -> dict[str, Any]:
-        """The sampler as a TOML table, which identifies it."""
-
-
-class _Parameters(Sampler):
-    """A sampler that is its parameters: numbers and tuples of numbers, as frozen dataclass fields."""
-
-    def table(self) -> dict[str, Any]:
-        """The sampler as a TOML table, which identifies it."""
-        values = {f.name: _listed(getattr(self, f.name)) for f in fields(self)}  # type: ignore[arg-type]
-        return {type(self).__name__.lower(): {name: value for name, value in values.items() if value is not None}}
-
-    def _keep(self, name: str, value: Any) -> None:
-        object.__setattr__(self, name, value)  # the way into a frozen dataclass
-
-    def _fits(self, field: str, components: int, *names: str, scalar: bool = True) -> None:
-        """Refuse a parameter that has another number of components than the quantity."""
-        for name in names:
-            shape = np.shape(getattr(self, name))
-            if shape != (components,) and not (scalar and shape == ()):
-                what = "a number" if components == 1 else f"{components} numbers"
-                raise ScenarioError(f"{field}, {type(self).__name__}.{name}", getattr(self, name), what)
-
-
 @dataclass(frozen=True)
-class Box(_Parameters):
+class Box(Parameters):
     """Uniform between two corners.
 
     Parameters
@@ -112,8 +55,8 @@ class Box(_Parameters):
     high: Any
 
     def __post_init__(self) -> None:
-        self._keep("low", _numbers("Box.low", self.low))
-        self._keep("high", _numbers("Box.high", self.high))
+        self.keep("low", numbers("Box.low", self.low))
+        self.keep("high", numbers("Box.high", self.high))
         low, high = np.asarray(self.low), np.asarray(self.high)
         if low.ndim and high.ndim and low.shape != high.shape:
             raise ScenarioError("Box.high", self.high, f"{low.size} numbers, as Box.low is")
@@ -126,7 +69,7 @@ class Box(_Parameters):
 
     def check(self, field: str, components: int) -> None:
         """Refuse corners of another dimension."""
-        self._fits(field, components, "low", "high")
+        self.fits(field, components, "low", "high")
 
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """Linear in the points."""
@@ -139,7 +82,7 @@ class Box(_Parameters):
         return float(np.min(self.low)), float(np.max(self.high))
 
 
-class _Round(_Parameters):
+class _Round(Parameters):
     """Uniform between two radii around a centre."""
 
     center: Any
@@ -148,7 +91,7 @@ class _Round(_Parameters):
         """Refuse a radius, and a centre of another dimension."""
         if components == 1:
             raise ScenarioError(field, self, "a sampler of numbers, such as Box: this quantity is a radius")
-        self._fits(field, components, "center", scalar=False)
+        self.fits(field, components, "center", scalar=False)
 
     def _spread(self, points: NDArray[np.float64], inner: float, outer: float) -> NDArray[np.float64]:
         dim = points.shape[1]
@@ -180,8 +123,8 @@ class Disk(_Round):
     radius: float
 
     def __post_init__(self) -> None:
-        self._keep("center", _numbers("Disk.center", self.center))
-        self._keep("radius", _positive("Disk.radius", self.radius))
+        self.keep("center", numbers("Disk.center", self.center))
+        self.keep("radius", positive("Disk.radius", self.radius))
 
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """In polar coordinates."""
@@ -205,12 +148,12 @@ class Annulus(_Round):
     outer: float
 
     def __post_init__(self) -> None:
-        self._keep("center", _numbers("Annulus.center", self.center))
-        self._keep("outer", _positive("Annulus.outer", self.outer))
-        inner = _numbers("Annulus.inner", self.inner)
+        self.keep("center", numbers("Annulus.center", self.center))
+        self.keep("outer", positive("Annulus.outer", self.outer))
+        inner = numbers("Annulus.inner", self.inner)
         if not isinstance(inner, float) or not 0.0 <= inner <= self.outer:
             raise ScenarioError("Annulus.inner", self.inner, f"a number in [0, {self.outer}], the outer radius")
-        self._keep("inner", inner)
+        self.keep("inner", inner)
 
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """In polar coordinates."""
@@ -218,7 +161,7 @@ class Annulus(_Round):
 
 
 @dataclass(frozen=True)
-class Gaussian(_Parameters):
+class Gaussian(Parameters):
     """Normal, x = mean + L z with L Lᵀ the covariance and z the normal quantiles of the points.
 
     Parameters
@@ -241,20 +184,20 @@ class Gaussian(_Parameters):
     cov: Any = None
 
     def __post_init__(self) -> None:
-        self._keep("mean", _numbers("Gaussian.mean", self.mean))
+        self.keep("mean", numbers("Gaussian.mean", self.mean))
         if (self.std is None) == (self.cov is None):
             raise ScenarioError("Gaussian", self, "given either std or cov")
         if self.std is not None:
-            std = _numbers("Gaussian.std", self.std)
+            std = numbers("Gaussian.std", self.std)
             if not np.all(np.asarray(std) > 0.0):
                 raise ScenarioError("Gaussian.std", self.std, "positive")
-            self._keep("std", std)
+            self.keep("std", std)
         else:
-            self._keep("cov", _covariance(self.cov))
+            self.keep("cov", covariance(self.cov))
 
     def check(self, field: str, components: int) -> None:
         """Refuse a mean, deviations or a covariance of another dimension."""
-        self._fits(field, components, *(["mean"] if self.std is None else ["mean", "std"]))
+        self.fits(field, components, *(["mean"] if self.std is None else ["mean", "std"]))
         if self.cov is not None and len(self.cov) != components:
             raise ScenarioError(f"{field}, Gaussian.cov", self.cov, f"of shape ({components}, {components})")
 
@@ -274,7 +217,7 @@ class Gaussian(_Parameters):
         return -math.inf, math.inf
 
 
-class _Listed(_Parameters):
+class _Listed(Parameters):
     """A sampler that returns entries of a list."""
 
     values: Any
@@ -286,10 +229,10 @@ class _Listed(_Parameters):
             array = np.asarray(self.values, dtype=np.float64)
         except (TypeError, ValueError):
             raise ScenarioError(name, self.values, rule) from None
-        numbers = np.asarray(self.values).dtype.kind in "iuf" and not np.isnan(array).any()
-        if array.ndim not in (1, 2) or not array.size or not numbers:
+        real = np.asarray(self.values).dtype.kind in "iuf" and not np.isnan(array).any()
+        if array.ndim not in (1, 2) or not array.size or not real:
             raise ScenarioError(name, self.values, rule)
-        self._keep("values", tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist()))
+        self.keep("values", tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist()))
 
     def check(self, field: str, components: int) -> None:
         """Refuse entries of another dimension."""
@@ -307,7 +250,7 @@ class _Listed(_Parameters):
 
     def table(self) -> dict[str, Any]:
         """The sampler as a TOML table, which identifies it."""
-        return {type(self).__name__.lower(): _listed(self.values)}
+        return {type(self).__name__.lower(): listed(self.values)}
 
 
 @dataclass(frozen=True)
@@ -352,38 +295,3 @@ class Cycle(_Listed):
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """By the number of the trial."""
         return self._take((block.first + np.arange(len(block.points))) % len(self.values), components)
-
-
-def _numbers(field: str, value: ArrayLike | None) -> float | tuple[float, ...]:
-    """A finite float, or 2 or 3 of them."""
-    rule = "a finite number, or a list of 2 or 3"
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError):
-        raise ScenarioError(field, value, rule) from None
-    if array.dtype.kind not in "iuf" or array.shape not in ((), (2,), (3,)) or not np.isfinite(array).all():
-        raise ScenarioError(field, value, rule)
-    return float(array) if array.ndim == 0 else tuple(map(float, array))
-
-
-def _positive(field: str, value: object) -> float:
-    number = _numbers(field, value)  # type: ignore[arg-type]
-    if not isinstance(number, float) or number <= 0.0:
-        raise ScenarioError(field, value, "a positive finite number")
-    return number
-
-
-def _covariance(value: ArrayLike) -> tuple[tuple[float, ...], ...]:
-    rule = "a symmetric positive definite matrix"
-    try:
-        matrix = np.asarray(value, dtype=np.float64)
-        np.linalg.cholesky(matrix)
-    except (TypeError, ValueError, np.linalg.LinAlgError):
-        raise ScenarioError("Gaussian.cov", value, rule) from None
-    if matrix.shape not in ((1, 1), (2, 2), (3, 3)) or not (np.isfinite(matrix).all() and (matrix == matrix.T).all()):
-        raise ScenarioError("Gaussian.cov", value, rule)
-    return tuple(map(tuple, matrix.tolist()))
-
-
-def _listed(value: Any) -> Any:
-    return [_listed(entry) for entry in value] if isinstance(value, tuple) else value

@@ -1,8 +1,8 @@
 """A study on disk: a folder of Parquet parts, one for each finished chunk, and a manifest that says whose they are.
 
 ``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
-``part-000000.parquet`` holds the outcomes of chunk 0 (`tadcore.study` lists the columns), with the digest, the chunk
-and the number of rows in its metadata. Every file appears whole: it is written under a temporary name, brought to the
+``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with the digest, the chunk and the number of
+rows in its metadata. Every file appears whole: it is written under a temporary name, brought to the
 disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
 any number may read.
 """

@@ -22,28 +22,25 @@ Every worker process builds its own table of gains. The store is written by the 
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from types import MappingProxyType
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from ._arrays import as_index
 from ._chunks import Plan
-from ._design import CHUNK, DESIGNS, Design
+from ._collect import StoppingRule, collect, jobs_of
+from ._design import DESIGNS, Design
 from ._game import game_of
 from ._progress import Progress
 from ._samplers import as_sampler
-from ._schedule import LostWorkerError, computed
-from ._table import schema_of, table_of
+from ._table import schema_of
 from ._vary import Quantity, normal
-from .errors import ScenarioError, WorkerError
-from .outcome import OutcomeKind
+from .errors import ScenarioError
 from .result import StudyResult, load_study
 from .sampling import Sampler
 from .scenario import Scenario
@@ -52,15 +49,6 @@ from .store import Manifest, Store
 __all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
 
 _MOST_TRIALS = 2**32  # points of the Sobol' sequence
-
-
-@runtime_checkable
-class StoppingRule(Protocol):
-    """When a study has seen enough, such as `tadcore.statistics.HalfWidth`."""
-
-    def satisfied(self, counts: NDArray[np.int64], trials: int) -> bool:
-        """Whether the counts of the outcomes, by `OutcomeKind`, after so many trials are enough."""
-        ...
 
 
 class Study:
@@ -175,7 +163,7 @@ class Study:
             How many.
         """
         wanted = self.trials if trials is None else as_index("trials", trials, self.trials, least=1)
-        drawn = [self._plan.draw(chunk, rows) for chunk, rows in _jobs(wanted)]
+        drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
         return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
 
     def replace(self, **changes: Any) -> Study:
@@ -246,7 +234,8 @@ class Study:
         schema = schema_of(self.columns)
         opened = contextlib.nullcontext() if store is None else Store.writing(store, self._manifest(), schema)
         with opened as kept, Progress(self.trials, wanted=progress) as bar:
-            return StudyResult(self, self._collect(kept, bar, schema, executor, workers, until))
+            table = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
+            return StudyResult(self, table)
 
     def _manifest(self) -> Manifest:
         return Manifest(
@@ -258,80 +247,6 @@ class Study:
             columns=self.columns,
         )
 
-    def _collect(
-        self,
-        store: Store | None,
-        bar: Progress,
-        schema: pa.Schema,
-        executor: Executor | None,
-        threads: int | None,
-        until: StoppingRule | None,
-    ) -> pa.Table:
-        """Every chunk from the store or computed, in order, up to where the rule holds."""
-        jobs = _jobs(self.trials)
-        gathered = _Gathered(until)
-        left = []
-        for chunk, rows in jobs:
-            if store is not None and store.rows.get(chunk, 0) >= rows:
-                bar.add(gathered.add(chunk, store.read(chunk).slice(0, rows)), stored=True)
-            else:
-                left.append((chunk, rows))
-        if store is not None:
-            store.stop(gathered.stopped)
-        if gathered.stopped is None and left:
-            try:
-                with contextlib.closing(computed(self._plan, left, executor, threads)) as results:
-                    for chunk, outcomes in results:
-                        table = table_of(chunk, outcomes, schema)
-                        if store is not None:
-                            store.write(chunk, table)
-                        bar.add(gathered.add(chunk, table))
-                        if gathered.stopped is not None:
-                            break
-            except LostWorkerError as error:
-                place = None if store is None else str(store.folder)
-                raise WorkerError(str(error), len(gathered.tables), len(jobs), place) from error.__cause__
-        if store is not None:
-            store.stop(gathered.stopped)
-        return gathered.table()
-
     def __repr__(self) -> str:
         paths = ", ".join(self.vary)
         return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"
-
-
-class _Gathered:
-    """Chunks as they come, looked at in their order."""
-
-    def __init__(self, until: StoppingRule | None) -> None:
-        self.tables: dict[int, pa.Table] = {}
-        self.stopped: int | None = None
-        self._until = until
-        self._looked = 0
-        self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
-
-    def add(self, chunk: int, table: pa.Table) -> NDArray[np.int64]:
-        """Keep a chunk and return its counts; ask the rule after every chunk before which none is missing."""
-        self.tables[chunk] = table
-        if self._until is not None:
-            while self.stopped is None and self._looked in self.tables:
-                self._counts += _counts(self.tables[self._looked])
-                self._looked += 1
-                trials = int(self._counts.sum())
-                if self._until.satisfied(self._counts.copy(), trials):
-                    self.stopped = trials
-        return _counts(table)
-
-    def table(self) -> pa.Table:
-        """All chunks in one table, or those up to where the rule held."""
-        last = self._looked if self.stopped is not None else len(self.tables)
-        return pa.concat_tables([self.tables[chunk] for chunk in range(last)]).combine_chunks()
-
-
-def _counts(table: pa.Table) -> NDArray[np.int64]:
-    return np.bincount(table["kind"].to_numpy(), minlength=len(OutcomeKind)).astype(np.int64)
-
-
-def _jobs(trials: int) -> list[tuple[int, int]]:
-    """Every chunk with the number of its trials."""
-    return [(chunk, min(CHUNK, trials - chunk * CHUNK)) for chunk in range(math.ceil(trials / CHUNK))]

@@ -83,7 +83,7 @@ def test_readers_of_parquet_need_nothing_of_ours(clean):
 KILLED = """
 import sys
 from study_cases import CHUNK, study
-study(40 * CHUNK).run(store=sys.argv[1], threads=1)
+study(20 * CHUNK).run(store=sys.argv[1], threads=1)
 """
 
 
@@ -97,14 +97,14 @@ def test_kill_9_loses_only_what_was_in_flight(tmp_path):
             process.send_signal(signal.SIGKILL)
         assert process.returncode == -signal.SIGKILL
         survived.append(parts(folder))
-        assert wanted <= len(survived[-1]) < 40
+        assert wanted <= len(survived[-1]) < 20
     assert survived[0].items() <= survived[1].items()
     cut = tadcore.load_study(folder)
     assert cut.trials == len(survived[1]) * CHUNK
-    assert "327,680 trials" in repr(cut)
+    assert "163,840 trials" in repr(cut)
     (folder / ".part-000099.parquet.abc").write_bytes(b"half a part")
-    result = study(40 * CHUNK).run(store=folder)
-    whole = study(40 * CHUNK).run(store=tmp_path / "whole")
+    result = study(20 * CHUNK).run(store=folder)
+    whole = study(20 * CHUNK).run(store=tmp_path / "whole")
     assert result.table.equals(whole.table)
     assert parts(folder) == parts(tmp_path / "whole")
     assert not list(folder.glob(".*"))
@@ -114,7 +114,7 @@ FORKED = """
 import concurrent.futures, multiprocessing, sys
 from study_cases import CHUNK, study
 with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
-    study(40 * CHUNK).run(store=sys.argv[1], executor=pool)
+    study(20 * CHUNK).run(store=sys.argv[1], executor=pool)
 """
 
 
@@ -280,7 +280,7 @@ def test_two_writers_are_refused(tmp_path):
         while process.poll() is None and not parts(folder):
             time.sleep(0.005)
         with pytest.raises(StoreError, match="another run is writing to it"):
-            study(40 * CHUNK).run(store=folder)
+            study(20 * CHUNK).run(store=folder)
         process.kill()
     study(2 * CHUNK, seed=1).run(store=tmp_path / "other")
     inside, go = threading.Event(), threading.Event()

@@ -67,9 +67,9 @@ class Counting(futures.ThreadPoolExecutor):
 
 def test_few_chunks_are_in_flight():
     with Counting() as pool:
-        result = study(12 * CHUNK).run(executor=pool)
+        result = study(8 * CHUNK).run(executor=pool)
     assert 2 <= pool.most <= 4
-    assert result.table.equals(study(12 * CHUNK).run().table)
+    assert result.table.equals(study(8 * CHUNK).run().table)
 
 
 class Backwards(futures.Executor):
