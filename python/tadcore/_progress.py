@@ -33,7 +33,7 @@ class Progress:
         if wanted and _watched():
             from tqdm.auto import tqdm
 
-            label = wanted if isinstance(wanted, str) else None
+            label = f"{wanted}: " if isinstance(wanted, str) else None
             self._bar = tqdm(total=total, desc=label, unit="", unit_scale=True, dynamic_ncols=True, bar_format=_FORMAT)
 
     def add(self, counts: NDArray[np.int64], *, stored: bool = False) -> None:

@@ -13,10 +13,12 @@ import contextlib
 import hashlib
 import json
 import os
+import platform
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
@@ -60,6 +62,8 @@ class Manifest:
         Names of the inputs.
     version, created : str
         The version of this library, and when the store was made (UTC).
+    environment : dict of str to str
+        What else the last bit of a draw may depend on: the machine, Python, NumPy and SciPy.
     """
 
     scenario: str
@@ -73,6 +77,7 @@ class Manifest:
     stream: int = STREAM
     version: str = _core.__version__
     created: str = ""
+    environment: dict[str, str] = field(default_factory=dict)
 
     @property
     def study(self) -> str:
@@ -86,6 +91,7 @@ class Manifest:
             "format": FORMAT,
             "tadcore_version": self.version,
             "created": self.created,
+            "environment": self.environment,
             "study_sha256": self.study,
             "scenario_sha256": hashlib.sha256(self.scenario.encode()).hexdigest(),
             "stream": self.stream,
@@ -121,6 +127,7 @@ class Manifest:
                 stream=int(content["stream"]),
                 version=str(content["tadcore_version"]),
                 created=str(content["created"]),
+                environment=dict(content["environment"]),
             )
         except FileNotFoundError:
             raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
@@ -234,7 +241,7 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
     if not (place / "manifest.json").exists():
         if any(place.glob("part-*.parquet")):
             raise StoreError(str(place), "it holds parts but no manifest", "name another folder for the store")
-        return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"))
+        return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=_environment())
     there = Manifest.read(place)
     if there.study != wanted.study:
         decides = ("scenario", "vary", "seed", "design", "chunk", "stream")
@@ -244,6 +251,11 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
         found = f"it was written by tadcore {there.version}, and this is {wanted.version}"
         raise StoreError(str(place), found, "continue it with that version, read it with load_study, or start anew")
     return there
+
+
+def _environment() -> dict[str, str]:
+    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
+    return {"machine": platform.platform(), "python": platform.python_version(), **packages}
 
 
 def _write(path: Path, content: str | bytes) -> None:

@@ -67,12 +67,15 @@ class SweepResult:
 
     Attributes
     ----------
+    study : Study
+        What was repeated.
     grid : dict of str to tuple
         The swept paths and their values.
     cells : tuple of Cell
         One for each point of the grid.
     """
 
+    study: Study
     grid: dict[str, tuple[Any, ...]]
     cells: tuple[Cell, ...]
 
@@ -93,6 +96,8 @@ class SweepResult:
             times NaN; ``escape_time`` is NaN everywhere else.
         """
         import xarray as xr
+
+        from ._dataset import provenance
 
         kinds = sorted(OutcomeKind)
         rows = [_summary(cell.result, kinds) for cell in self.cells]
@@ -117,6 +122,7 @@ class SweepResult:
                 "outcome": [kind.name.lower() for kind in kinds],
                 "status": (dims, over([cell.status for cell in self.cells])),
             },
+            attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
         )
 
     def __repr__(self) -> str:
@@ -190,7 +196,7 @@ def sweep(
         except NoEquilibriumError as error:
             escape = error.escape_time
         cells.append(Cell(point, one, result, escape))
-    return SweepResult(axes, tuple(cells))
+    return SweepResult(study, axes, tuple(cells))
 
 
 def _axes(study: Study, grid: Mapping[str, Sequence[Any]]) -> dict[str, tuple[Any, ...]]:

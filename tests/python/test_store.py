@@ -50,6 +50,7 @@ def test_a_store_says_what_it_holds(clean):
     assert manifest["tadcore_version"] == tadcore.__version__
     assert manifest["vary"]["attacker.position"] == {"disk": {"center": [0.0, 1.0], "radius": 2.0}}
     assert tadcore.Scenario.from_toml_string(manifest["scenario"]) == result.scenario
+    assert manifest["environment"]["numpy"] == np.__version__
     about = pq.read_metadata(folder / "part-000002.parquet").metadata
     assert about[b"tadcore_study"].decode() == manifest["study_sha256"]
     assert (about[b"tadcore_chunk"], about[b"tadcore_rows"]) == (b"2", b"500")

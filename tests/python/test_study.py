@@ -1,10 +1,12 @@
 """Studies: the draws redone by hand, prefixes, threads, designs, stopping, replay, and what is refused."""
 
 import math
+import re
 import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
 import numpy as np
@@ -321,6 +323,25 @@ def test_a_study_reads_well():
         f"{ends['intercepted']} intercepted)"
     )
     assert (result.seed, result.scenario) == (7, calm())
+
+
+def last_state(capsys):
+    """The last state of the bar: trials done and the running estimates."""
+    shown = capsys.readouterr().err.replace("\n", "\r").strip("\r ").split("\r")[-1]
+    found = re.search(r"([\d.]+k?)/([\d.]+k?) \[.*intercepted ([\d.]+) captured ([\d.]+) timeout ([\d.]+)", shown)
+    return shown, found[1], found[2], [float(found[i]) for i in (5, 4, 3)]
+
+
+def test_a_notebook_gets_a_bar_that_counts_what_the_store_holds(monkeypatch, capsys, tmp_path):
+    shell = types.SimpleNamespace(config={"IPKernelApp": {}})
+    study(CHUNK).run(store=tmp_path, progress=True)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    result = study(2 * CHUNK).run(store=tmp_path, progress="cell 1/3")
+    shown, done, total, estimates = last_state(capsys)
+    assert shown.startswith("cell 1/3: |")
+    assert (done, total) == ("16.4k", "16.4k")
+    assert estimates == pytest.approx([count / (2 * CHUNK) for count in result.counts().values()], abs=5.1e-4)
 
 
 SLOW = """

@@ -32,6 +32,8 @@ def test_every_cell_is_the_study_of_its_scenario():
             assert float(at["mean_end"]) == pytest.approx(alone.time.mean())
             assert (int(at["trials"]), str(at["status"].values)) == (400, "done")
     assert np.isnan(data["escape_time"]).all()
+    assert tadcore.Scenario.from_toml_string(data.attrs["scenario"]) == base.scenario
+    assert (data.attrs["seed"], data.attrs["design"]) == ("7", "random")
     first, *others = (cell.result.inputs for cell in swept.cells)
     assert all(np.array_equal(first[name], other[name]) for other in others for name in first)
     assert len({tuple(cell.result.counts().items()) for cell in swept.cells}) > 3
