@@ -57,7 +57,7 @@ class Quantity:
         return tuple(f"{self.path}.{_AXES[axis]}" for axis in range(self.components))
 
 
-def quantities(sc: Scenario, vary: Any) -> tuple[tuple[Quantity, Sampler], ...]:
+def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, Sampler], ...]:
     """Every quantity that varies, with its sampler, in the order attacker, target, defenders.
 
     Raises
@@ -65,8 +65,6 @@ def quantities(sc: Scenario, vary: Any) -> tuple[tuple[Quantity, Sampler], ...]:
     ScenarioError
         A path leads nowhere or to a weight, two paths mean the same quantity, or a sampler does not fit.
     """
-    if not isinstance(vary, Mapping):
-        raise ScenarioError("vary", vary, 'a mapping such as {"attacker.position": Box([-3, -3], [3, 3])}')
     known = _known(sc)
     found: dict[str, tuple[Quantity, Sampler, str]] = {}
     for path, value in vary.items():

@@ -16,7 +16,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 import tadcore
-from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, ring, study
+from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, parts, ring, study
 from tadcore import ScenarioError, Study
 from tadcore.sampling import Box, Cycle, Disk, Gaussian
 
@@ -284,6 +284,14 @@ def test_a_bad_draw_is_refused_before_anything_runs(vary, words, monkeypatch, tm
     with pytest.raises(ScenarioError, match=words):
         study(2 * CHUNK, vary=vary).run(store=tmp_path / "store")
     assert not (tmp_path / "store").exists()
+
+
+def test_a_bad_draw_beyond_the_first_million_ends_the_study_and_keeps_what_came_before(monkeypatch, tmp_path):
+    monkeypatch.setattr("tadcore._chunks._CHECKED_AHEAD", 1)
+    with pytest.raises(ScenarioError, match=r"attacker\.position\.y, trial 9,000: got nan"):
+        study(2 * CHUNK, vary={"attacker.position": nan_at_9000}).run(store=tmp_path)
+    assert list(parts(tmp_path)) == ["part-000000.parquet"]
+    assert tadcore.load_study(tmp_path).trials == CHUNK
 
 
 def test_radii_without_limit_and_distributions_that_reach_below_are_taken_as_drawn():
