@@ -93,6 +93,11 @@ class _Round(Parameters):
             raise ScenarioError(field, self, "a sampler of numbers, such as Box: this quantity is a radius")
         self.fits(field, components, "center", scalar=False)
 
+    def bounds(self) -> tuple[float, float]:
+        """The extremes of the coordinates."""
+        reach = float(getattr(self, "outer", 0.0) or getattr(self, "radius", 0.0))
+        return float(np.min(self.center)) - reach, float(np.max(self.center)) + reach
+
     def _spread(self, points: NDArray[np.float64], inner: float, outer: float) -> NDArray[np.float64]:
         dim = points.shape[1]
         hole = (inner / outer) ** dim

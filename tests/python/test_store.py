@@ -82,8 +82,11 @@ def test_readers_of_parquet_need_nothing_of_ours(clean):
 
 
 KILLED = """
-import sys
+import sys, time
 from study_cases import CHUNK, study
+from tadcore.store import Store
+write = Store.write
+Store.write = lambda *given: (time.sleep(0.05), write(*given))  # slow enough to be met on the way
 study(20 * CHUNK).run(store=sys.argv[1], threads=1)
 """
 

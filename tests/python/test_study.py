@@ -357,7 +357,7 @@ import time, tadcore
 from tadcore.sampling import Box
 from study_cases import CHUNK
 sc = tadcore.scenarios.load("paper-i1")
-study = tadcore.Study(sc, {"*.position": Box(-3, 3)}, trials=20 * CHUNK)
+study = tadcore.Study(sc, {"*.position": Box(-3, 3)}, trials=200 * CHUNK)
 print("ready", flush=True)
 try:
     study.run(progress=True)
