@@ -146,7 +146,7 @@ def test_the_command_plays_keeps_and_continues(written, tmp_path, capsys):
 def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path):
     place = written(FILE.replace("trials = 300", f"trials = {300 * CHUNK}"))
     ours, theirs = pty.openpty()
-    termios.tcsetwinsize(ours, (24, 80))
+    termios.tcsetwinsize(ours, (24, 90))
     command = [
         sys.executable,
         "-c",
