@@ -5,8 +5,9 @@
 >>> print(run.outcome)
 d1 intercepts the attacker at t = 1.395
 
-A `Scenario` says what is played; `solve_equilibrium`, `synthesize`, `simulate` and `simulate_batch` compute. Bad input
-raises `ScenarioError`, a game without an equilibrium `NoEquilibriumError`.
+A `Scenario` says what is played; `solve_equilibrium`, `synthesize`, `simulate` and `simulate_batch` compute; a `Study`
+draws, plays and keeps as many games as one likes, and `sweep` repeats it over weights. Bad input raises
+`ScenarioError`, a game without an equilibrium `NoEquilibriumError`.
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ if TYPE_CHECKING:
     from ._core import __version__
     from .batch import Batch, simulate_batch
     from .equilibrium import Equilibrium, solve_equilibrium
-    from .errors import NoEquilibriumError, ScenarioError, TadcoreError
+    from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
+    from .result import StudyResult, load_study
     from .scenario import Attacker, Defender, Scenario, Target
     from .simulation import Run, simulate
+    from .study import Study
+    from .sweeps import SweepResult, sweep
     from .synthesis import Gains, synthesize
 
 __all__ = [
@@ -39,14 +43,21 @@ __all__ = [
     "Run",
     "Scenario",
     "ScenarioError",
+    "StoreError",
+    "Study",
+    "StudyResult",
+    "SweepResult",
     "TadcoreError",
     "Target",
     "VisibilityNetwork",
+    "WorkerError",
     "__version__",
+    "load_study",
     "scenarios",
     "simulate",
     "simulate_batch",
     "solve_equilibrium",
+    "sweep",
     "synthesize",
 ]
 
@@ -63,16 +74,23 @@ _HOMES = {
     "Run": "simulation",
     "Scenario": "scenario",
     "ScenarioError": "errors",
+    "StoreError": "errors",
+    "Study": "study",
+    "StudyResult": "result",
+    "SweepResult": "sweeps",
     "TadcoreError": "errors",
     "Target": "scenario",
     "VisibilityNetwork": "network",
+    "WorkerError": "errors",
     "__version__": "_core",
+    "load_study": "result",
     "simulate": "simulation",
     "simulate_batch": "batch",
     "solve_equilibrium": "equilibrium",
+    "sweep": "sweeps",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "scenarios"}
+_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "sampling", "scenarios", "store"}
 
 
 def __getattr__(name: str) -> Any:

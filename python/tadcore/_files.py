@@ -50,8 +50,11 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         raise ScenarioError(f"{name}, line {line}", found, f"valid TOML ({reason})") from None
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write beside the destination, then rename onto it, so that no reader meets half a file."""
+def write_whole(path: str | os.PathLike[str], content: str | bytes, *, durable: bool = False) -> None:
+    """Write beside the destination, then rename onto it, so that no reader meets half a file.
+
+    With ``durable`` it returns when the bytes and the name are on the disk, safe from a loss of power.
+    """
     destination = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
     descriptor, name = tempfile.mkstemp(prefix=f".{destination.name}.", dir=destination.parent)
@@ -59,11 +62,27 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     try:
         with os.fdopen(descriptor, "wb") as stream:
             stream.write(data)
+            if durable:
+                stream.flush()
+                os.fsync(stream.fileno())
         partial.chmod(0o666 & ~_umask())
         partial.replace(destination)
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
+    if durable:
+        _sync_folder(destination.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring a new name to the disk, where the system can open folders at all."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _umask() -> int:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import scenarios as bundled
+from ._cli_study import study
 from ._terminal import complain, say
-from .errors import MISSING, ScenarioError, TadcoreError
+from .errors import MISSING, ScenarioError, StoreError, TadcoreError
 
 if TYPE_CHECKING:
     from .scenario import Scenario
@@ -156,6 +157,9 @@ def validate(
         say(line, indent=2)
 
 
+app.command(short_help="Play many games from a study file.")(study)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; leaves with one of the exit codes above."""
     for stream in (sys.stdout, sys.stderr):
@@ -165,6 +169,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         app(args=None if arguments is None else list(arguments), prog_name="tadcore")
     except ScenarioError as error:
         complain("\n".join([str(error), *getattr(error, "__notes__", ())]))
+        sys.exit(_BAD_INPUT)
+    except StoreError as error:
+        complain(str(error))
         sys.exit(_BAD_INPUT)
     except TadcoreError as error:
         complain(str(error))

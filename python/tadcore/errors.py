@@ -13,7 +13,7 @@ import reprlib
 from collections.abc import Iterable
 from decimal import Decimal
 
-__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "TadcoreError"]
+__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "StoreError", "TadcoreError", "WorkerError"]
 
 
 class Missing(enum.Enum):
@@ -139,6 +139,58 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.escape_time, self.horizon, self.step)
+
+
+class StoreError(TadcoreError, RuntimeError):
+    """A store of a study that cannot be used as it is; whatever it holds is left untouched.
+
+    Parameters
+    ----------
+    path : str
+        The folder, or the file in it.
+    found : str
+        What is the matter.
+    remedy : str
+        What to do.
+    """
+
+    def __init__(self, path: str, found: str, remedy: str) -> None:
+        super().__init__(path, found, remedy)
+        self.path = path
+        self.found = found
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.found}; {self.remedy}"
+
+
+class WorkerError(TadcoreError, RuntimeError):
+    """A worker of an executor died before it returned its chunk.
+
+    Parameters
+    ----------
+    reason : str
+        What the executor says.
+    done, chunks : int
+        Chunks finished, and chunks asked for.
+    store : str or None
+        The folder that holds the finished chunks; None where the study runs without one.
+    """
+
+    def __init__(self, reason: str, done: int, chunks: int, store: str | None) -> None:
+        super().__init__(reason, done, chunks, store)
+        self.reason = reason
+        self.done = done
+        self.chunks = chunks
+        self.store = store
+
+    def __str__(self) -> str:
+        kept = (
+            f"they are kept in {self.store}: run the study again with this store and a fresh executor to go on"
+            if self.store is not None
+            else "they are lost: with store=… a study keeps them and goes on from there when it is run again"
+        )
+        return f"a worker died ({self.reason}) when {self.done} of {self.chunks} chunks were finished; {kept}"
 
 
 def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:

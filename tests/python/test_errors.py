@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from tadcore import NoEquilibriumError, ScenarioError, TadcoreError
+from tadcore import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
 
 
 def test_every_error_is_one_of_ours_and_a_built_in():
@@ -65,3 +65,20 @@ def test_a_value_whose_repr_fails_does_not_hide_the_error():
             raise RuntimeError
 
     assert "Broken" in str(ScenarioError("a", Broken(), "b"))
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (StoreError("out", "it is full", "make room"), "out: it is full; make room"),
+        (WorkerError("killed", 2, 5, "out"), "when 2 of 5 chunks were finished; they are kept in out: run the study"),
+        (WorkerError("killed", 2, 5, None), "they are lost: with store=… a study keeps them"),
+    ],
+)
+def test_faults_of_stores_and_workers_say_what_to_do_and_travel(error, text):
+    assert isinstance(error, TadcoreError)
+    assert isinstance(error, RuntimeError)
+    assert text in str(error)
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert vars(again) == vars(error)

@@ -57,7 +57,7 @@ def test_an_unknown_keyword_is_refused_everywhere():
         tadcore.Scenario(**sc.model_dump(), colour="red")
 
 
-@pytest.mark.parametrize("name", ["equilibrium", "synthesis", "simulation", "batch"])
+@pytest.mark.parametrize("name", ["equilibrium", "synthesis", "simulation", "batch", "result", "sweeps"])
 def test_every_parameter_is_documented(name):
     pytest.importorskip("tadcore._core")
     module = importlib.import_module(f"tadcore.{name}")

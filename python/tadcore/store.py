@@ -1,0 +1,280 @@
+"""A study on disk: a folder of Parquet parts, one for each finished chunk, and a manifest that says whose they are.
+
+``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
+``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with the digest, the chunk and the number of
+rows in its metadata. Every file appears whole: it is written under a temporary name, brought to the
+disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
+any number may read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import platform
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Self
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
+
+from . import _core
+from ._design import CHUNK, STREAM
+from ._files import write_whole
+from ._samplers import as_plain, from_plain
+from ._table import encoded
+from .errors import StoreError
+
+__all__ = ["FORMAT", "Manifest", "Store"]
+
+FORMAT = 1
+"""Version of the layout of a store."""
+
+_PART = re.compile(r"part-(\d{6,})\.parquet")
+_AGAIN = "delete this file and run the study again: only its chunk is computed anew"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a store says about itself.
+
+    Attributes
+    ----------
+    scenario : str
+        The scenario as TOML.
+    vary : dict of str to dict
+        The sampler of every varied path, as a table.
+    seed, design, chunk, stream
+        Where the draws come from; ``chunk`` is the number of trials in a chunk, ``stream`` the version of the draws.
+    trials : int
+        The length of the longest study that was asked for.
+    stopped : int or None
+        The trials after which a stopping rule held.
+    columns : tuple of str
+        Names of the inputs.
+    version, created : str
+        The version of this library, and when the store was made (UTC).
+    environment : dict of str to str
+        What else the last bit of a draw may depend on: the machine, Python, NumPy and SciPy.
+    """
+
+    scenario: str
+    vary: dict[str, dict[str, Any]]
+    seed: int
+    design: str
+    trials: int
+    columns: tuple[str, ...]
+    stopped: int | None = None
+    chunk: int = CHUNK
+    stream: int = STREAM
+    version: str = _core.__version__
+    created: str = ""
+    environment: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def study(self) -> str:
+        """Digest of everything that decides an outcome: scenario, vary, seed, design, chunk and stream."""
+        decides = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
+        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """The text of ``manifest.json``."""
+        content = {
+            "format": FORMAT,
+            "tadcore_version": self.version,
+            "created": self.created,
+            "environment": self.environment,
+            "study_sha256": self.study,
+            "scenario_sha256": hashlib.sha256(self.scenario.encode()).hexdigest(),
+            "stream": self.stream,
+            "seed": self.seed,
+            "design": self.design,
+            "chunk": self.chunk,
+            "trials": self.trials,
+            "stopped": self.stopped,
+            "columns": list(self.columns),
+            "vary": as_plain(self.vary),
+            "scenario": self.scenario,
+        }
+        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+    @classmethod
+    def read(cls, folder: str | os.PathLike[str]) -> Manifest:
+        """The manifest of a store; raises `StoreError` where there is none that can be read."""
+        path = Path(folder) / "manifest.json"
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            if content["format"] != FORMAT:
+                found = f"it has format {content['format']}, and this version of tadcore reads {FORMAT}"
+                raise StoreError(str(path), found, "read it with the version that wrote it")
+            manifest = cls(
+                scenario=str(content["scenario"]),
+                vary=from_plain(dict(content["vary"])),
+                seed=int(content["seed"]),
+                design=str(content["design"]),
+                trials=int(content["trials"]),
+                columns=tuple(content["columns"]),
+                stopped=None if content["stopped"] is None else int(content["stopped"]),
+                chunk=int(content["chunk"]),
+                stream=int(content["stream"]),
+                version=str(content["tadcore_version"]),
+                created=str(content["created"]),
+                environment=dict(content["environment"]),
+            )
+        except FileNotFoundError:
+            raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
+        except OSError as error:
+            raise StoreError(str(path), f"it cannot be read ({_reason(error)})", "check the path") from None
+        except (ValueError, KeyError, TypeError) as error:
+            raise StoreError(str(path), f"it is no manifest of a study ({error})", "name another folder") from None
+        if manifest.study != content.get("study_sha256"):
+            raise StoreError(str(path), "its digest does not fit its content: it was edited", "name another folder")
+        return manifest
+
+
+class Store:
+    """The parts of one study in one folder; made by `Store.writing` or `Store.reading`."""
+
+    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest, schema: pa.Schema) -> None:
+        self.folder = Path(folder)
+        self.manifest = manifest
+        self.schema = schema
+        self.rows = self._verified()
+
+    @classmethod
+    def reading(cls, folder: str | os.PathLike[str], schema: pa.Schema) -> Self:
+        """The store as it is, its parts verified."""
+        return cls(folder, Manifest.read(folder), schema)
+
+    @classmethod
+    @contextlib.contextmanager
+    def writing(cls, folder: str | os.PathLike[str], wanted: Manifest, schema: pa.Schema) -> Iterator[Self]:
+        """Make or continue the store of a study, alone; raises `StoreError` where another run or study has it."""
+        place = Path(folder)
+        with _faults(place):
+            place.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(place / "store.lock", timeout=0)
+        try:
+            with _faults(place):
+                lock.acquire()
+        except Timeout:
+            raise StoreError(str(place), "another run is writing to it", "wait for its end, or stop it") from None
+        try:
+            manifest = _agreed(place, wanted)
+            for partial in [*place.glob(".part-*.parquet.*"), *place.glob(".manifest.json.*")]:
+                with _faults(partial):
+                    partial.unlink()  # left by a run that was killed
+            if manifest.trials != wanted.trials or not (place / "manifest.json").exists():
+                manifest = replace(manifest, trials=max(manifest.trials, wanted.trials))
+                _write(place / "manifest.json", manifest.to_json())
+            yield cls(place, manifest, schema)
+        finally:
+            lock.release()
+
+    def read(self, chunk: int) -> pa.Table:
+        """The outcomes of a chunk, its pages verified."""
+        path = self._part(chunk)
+        try:
+            table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
+        return table.cast(self.schema)
+
+    def write(self, chunk: int, table: pa.Table) -> None:
+        """Keep the outcomes of a chunk; they are on the disk when this returns."""
+        rows = len(table)
+        about = {"tadcore_study": self.manifest.study, "tadcore_chunk": str(chunk), "tadcore_rows": str(rows)}
+        _write(self._part(chunk), encoded(table, about))
+        self.rows[chunk] = rows
+
+    def stop(self, trials: int | None) -> None:
+        """Note after how many trials a stopping rule held."""
+        if trials != self.manifest.stopped:
+            self.manifest = replace(self.manifest, stopped=trials)
+            _write(self.folder / "manifest.json", self.manifest.to_json())
+
+    def _part(self, chunk: int) -> Path:
+        return self.folder / f"part-{chunk:06d}.parquet"
+
+    def _verified(self) -> dict[int, int]:
+        """Rows of every part, by chunk; raises `StoreError` naming one that does not belong here."""
+        rows: dict[int, int] = {}
+        with _faults(self.folder):
+            found = sorted(self.folder.glob("part-*.parquet"))
+        for path in found:
+            match = _PART.fullmatch(path.name)
+            if match is None or path.name != self._part(int(match[1])).name:
+                raise StoreError(str(path), "its name is not that of a part", "move it out of this folder")
+            rows[int(match[1])] = self._rows_of(path, int(match[1]))
+        return rows
+
+    def _rows_of(self, path: Path, chunk: int) -> int:
+        try:
+            with pq.ParquetFile(path) as part:
+                about = part.metadata.metadata or {}
+                rows, schema = part.metadata.num_rows, part.schema_arrow
+        except (OSError, pa.ArrowException) as error:
+            raise StoreError(str(path), f"it is truncated or no Parquet file ({error})", _AGAIN) from None
+        said = {key: about.get(f"tadcore_{key}".encode(), b"").decode() for key in ("study", "chunk", "rows")}
+        if said["study"] != self.manifest.study:
+            found = "another study" if said["study"] else "no study"
+            raise StoreError(str(path), f"it belongs to {found}", "move it out of this folder, or name another store")
+        if said["chunk"] != str(chunk):
+            raise StoreError(str(path), f"it holds chunk {said['chunk']}, not {chunk}", "give it its name back")
+        if said["rows"] != str(rows) or not 0 < rows <= self.manifest.chunk:
+            raise StoreError(str(path), f"it has {rows} rows, and says {said['rows']}", _AGAIN)
+        if not schema.remove_metadata().equals(self.schema):
+            raise StoreError(str(path), f"its columns are {schema.names}, not {self.schema.names}", _AGAIN)
+        return int(rows)
+
+
+def _agreed(place: Path, wanted: Manifest) -> Manifest:
+    """The manifest that is there if it is this study's, or the one to write."""
+    if not (place / "manifest.json").exists():
+        if any(place.glob("part-*.parquet")):
+            raise StoreError(str(place), "it holds parts but no manifest", "name another folder for the store")
+        return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=_environment())
+    there = Manifest.read(place)
+    if there.study != wanted.study:
+        decides = ("scenario", "vary", "seed", "design", "chunk", "stream")
+        differ = ", ".join(name for name in decides if getattr(there, name) != getattr(wanted, name))
+        raise StoreError(str(place), f"it holds another study (its {differ} differ)", "name another folder")
+    if there.version != wanted.version:
+        found = f"it was written by tadcore {there.version}, and this is {wanted.version}"
+        raise StoreError(str(place), found, "continue it with that version, read it with load_study, or start anew")
+    return there
+
+
+def _environment() -> dict[str, str]:
+    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
+    return {"machine": platform.platform(), "python": platform.python_version(), **packages}
+
+
+def _write(path: Path, content: str | bytes) -> None:
+    with _faults(path):
+        write_whole(path, content, durable=True)
+
+
+@contextlib.contextmanager
+def _faults(path: Path) -> Iterator[None]:
+    """What the operating system refuses, in the words of a store."""
+    try:
+        yield
+    except Timeout:
+        raise
+    except OSError as error:
+        found = f"it cannot be written or read ({_reason(error)})"
+        remedy = "nothing that was finished is lost: make room or name a folder that can be written, and run again"
+        raise StoreError(str(path), found, remedy) from error
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
