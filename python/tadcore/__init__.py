@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from .errors import NoEquilibriumError, ScenarioError, TadcoreError
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
+    from .maps import OutcomeMap, outcome_map
+    from .radius import RadiusCurve, radius_curve
     from .scenario import Attacker, Defender, Scenario, Target
     from .simulation import Run, simulate
+    from .statistics import HalfWidth
     from .synthesis import Gains, synthesize
 
 __all__ = [
@@ -32,10 +35,13 @@ __all__ = [
     "Defender",
     "Equilibrium",
     "Gains",
+    "HalfWidth",
     "NetworkChange",
     "NoEquilibriumError",
     "Outcome",
     "OutcomeKind",
+    "OutcomeMap",
+    "RadiusCurve",
     "Run",
     "Scenario",
     "ScenarioError",
@@ -43,6 +49,8 @@ __all__ = [
     "Target",
     "VisibilityNetwork",
     "__version__",
+    "outcome_map",
+    "radius_curve",
     "scenarios",
     "simulate",
     "simulate_batch",
@@ -56,10 +64,13 @@ _HOMES = {
     "Defender": "scenario",
     "Equilibrium": "equilibrium",
     "Gains": "synthesis",
+    "HalfWidth": "statistics",
     "NetworkChange": "network",
     "NoEquilibriumError": "errors",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
+    "OutcomeMap": "maps",
+    "RadiusCurve": "radius",
     "Run": "simulation",
     "Scenario": "scenario",
     "ScenarioError": "errors",
@@ -67,12 +78,14 @@ _HOMES = {
     "Target": "scenario",
     "VisibilityNetwork": "network",
     "__version__": "_core",
+    "outcome_map": "maps",
+    "radius_curve": "radius",
     "simulate": "simulation",
     "simulate_batch": "batch",
     "solve_equilibrium": "equilibrium",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "scenarios"}
+_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "report", "reproduce", "scenarios", "sensitivity", "statistics"}
 
 
 def __getattr__(name: str) -> Any:
