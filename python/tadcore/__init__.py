@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from .batch import Batch, simulate_batch
     from .equilibrium import Equilibrium, solve_equilibrium
     from .errors import NoEquilibriumError, ScenarioError, TadcoreError
+    from .maps import OutcomeMap, outcome_map
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
-    from .maps import OutcomeMap, outcome_map
     from .radius import RadiusCurve, radius_curve
     from .scenario import Attacker, Defender, Scenario, Target
     from .simulation import Run, simulate
@@ -85,7 +85,15 @@ _HOMES = {
     "solve_equilibrium": "equilibrium",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "report", "reproduce", "scenarios", "sensitivity", "statistics"}
+_ROOMS = frozenset(_HOMES.values()) | {
+    "cli",
+    "plotting",
+    "report",
+    "reproduce",
+    "scenarios",
+    "sensitivity",
+    "statistics",
+}
 
 
 def __getattr__(name: str) -> Any:
