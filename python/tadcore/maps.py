@@ -64,8 +64,10 @@ class OutcomeMap:
 
         return draw(self, ax, **options)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the data (``.nc``, netCDF 3) or the figure (``.png``, ``.pdf``, ``.svg``), whole or not at all.
+
+        Options go to `plot`, where a figure is written.
 
         Raises
         ------
@@ -73,7 +75,7 @@ class OutcomeMap:
             The file name ends in something else.
         """
         target = Path(path)
-        check_destination(target)
+        check_destination("path", target)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.suffix == ".nc":
             from ._files import write_whole
@@ -85,7 +87,7 @@ class OutcomeMap:
         from . import plotting
 
         with plotting.style():
-            figure = self.plot().get_figure(root=True)
+            figure = self.plot(**options).get_figure(root=True)
             assert figure is not None
             plotting.save(figure, target.with_suffix(""), formats=[target.suffix[1:]])
             plt.close(figure)
@@ -191,11 +193,11 @@ def outcome_map(
     )
 
 
-def check_destination(path: Path) -> None:
+def check_destination(field: str, path: Path) -> None:
     """Refuse a file name that tells nothing of what to write."""
     if path.suffix not in _FIGURES | {".nc"}:
         kinds = ", ".join(sorted(_FIGURES))
-        raise ScenarioError("path", str(path), f"the name of a figure ({kinds}) or of data (.nc)")
+        raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
 
 
 def _axis(field: str, given: Sequence[Any]) -> NDArray[np.float64]:

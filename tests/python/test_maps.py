@@ -108,7 +108,7 @@ def test_the_command_line_draws_and_saves(tmp_path, capsys):
         assert leave("map", "paper-i1", "--x", -3, 3, "--y", -3.5, 3, "--size", 12, "--out", out) == 0
         assert out.stat().st_size > 1000
     printed = capsys.readouterr()
-    assert "144 places" in printed.out
+    assert "156 places" in printed.out
     assert printed.err == ""
     data = xr.load_dataset(tmp_path / "map.nc", engine="scipy")
     assert data["y"].values[[0, -1]].tolist() == [-3.5, 3.0]

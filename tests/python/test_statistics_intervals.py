@@ -83,6 +83,9 @@ def test_options_are_checked():
         HalfWidth(0.1).intervals({}, 10)
     with pytest.raises(ScenarioError, match="counts"):
         HalfWidth(0.1).intervals({"captured": 11}, 10)
+    for counts in ([1, 2], [[1, 2, 3]], [0.5, 1.5, 2.0], 3):
+        with pytest.raises(ScenarioError, match="counts"):
+            HalfWidth(0.1).intervals(counts, 10)
 
 
 @pytest.mark.parametrize(
@@ -114,6 +117,7 @@ def test_the_error_is_shared_between_the_outcomes():
     counts = {"timeout": 10, "captured": 60, "intercepted": 130}
     found = HalfWidth(0.1, level=0.94).intervals(counts, 200)
     assert found == {name: mixture_interval(count, 200, (1 - 0.94) / 3) for name, count in counts.items()}
+    assert HalfWidth(0.1, level=0.94).intervals(np.array([10, 60, 130]), 200) == found
     widest = max(high - low for low, high in found.values())
     assert HalfWidth(widest / 2 + 1e-12, level=0.94).satisfied(counts, 200)
     assert not HalfWidth(widest / 2 - 1e-12, level=0.94).satisfied(counts, 200)
@@ -146,10 +150,10 @@ def test_stopping_by_the_rule_keeps_its_promise():
     held = 0
     for _ in range(studies):
         counts, trials = np.zeros(3, dtype=int), 0
-        while not rule.satisfied(dict(enumerate(counts.tolist())), trials):
+        while not rule.satisfied(counts, trials):
             counts += rng.multinomial(50, truth)
             trials += 50
-        final = rule.intervals(dict(enumerate(counts.tolist())), trials).values()
+        final = rule.intervals(counts, trials).values()
         held += all(low <= p <= high for (low, high), p in zip(final, truth, strict=True))
     assert held / studies >= 0.9 - 4 * math.sqrt(0.09 / studies)
 

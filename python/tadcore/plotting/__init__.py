@@ -11,6 +11,7 @@ from ._series import MAX_VERTICALS, controls, distances, theta
 from ._style import COLUMN, PAGE, style
 from ._trajectories import MAX_EDGE_LABELS, trajectories
 from .maps import outcome_map
+from .shares import outcomes_by_input, outcomes_by_inputs
 from .studies import comparison, incidence, outcome_probabilities, radius_curve, sensitivity
 
 __all__ = [
@@ -26,6 +27,8 @@ __all__ = [
     "network",
     "outcome_map",
     "outcome_probabilities",
+    "outcomes_by_input",
+    "outcomes_by_inputs",
     "radius_curve",
     "save",
     "sensitivity",

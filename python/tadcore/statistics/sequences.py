@@ -28,11 +28,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tadcore._arrays import as_index
 from tadcore.errors import ScenarioError
 
-from ._outcomes import as_level
+from ._outcomes import KINDS, as_level, outcome_names
 
 
 @dataclass(frozen=True)
@@ -74,14 +75,14 @@ class HalfWidth:
         if not number or not 0.0 < float(self.width) < 0.5:
             raise ScenarioError("width", self.width, "a half-width in (0, 0.5)")
 
-    def intervals(self, counts: Mapping[str, int], trials: int) -> dict[str, tuple[float, float]]:
+    def intervals(self, counts: Mapping[str, int] | ArrayLike, trials: int) -> dict[str, tuple[float, float]]:
         """Low and high of each outcome's probability after so many trials.
 
         Parameters
         ----------
-        counts : mapping of str to int
-            How many trials ended in each outcome, as `outcome_counts` gives them; a study must name the same outcomes
-            at every look.
+        counts : mapping of str to int, or array_like of int
+            How many trials ended in each outcome, as `outcome_counts` gives them; without names, in that order:
+            by `OutcomeKind`, then by defender. A study must count the same outcomes at every look.
         trials : int
             How many trials there were.
 
@@ -93,20 +94,32 @@ class HalfWidth:
         Raises
         ------
         ScenarioError
-            No outcome is named, or a count is not in [0, trials].
+            No outcome is counted, or a count is not in [0, trials].
         """
         total = as_index("trials", trials, 2**53)
-        if not counts:
-            raise ScenarioError("counts", dict(counts), "one count for each outcome")
-        error = (1.0 - self.level) / len(counts)
+        named = _named(counts)
+        error = (1.0 - self.level) / len(named)
         return {
             name: mixture_interval(as_index(f"counts[{name!r}]", count, total), total, error)
-            for name, count in counts.items()
+            for name, count in named.items()
         }
 
-    def satisfied(self, counts: Mapping[str, int], trials: int) -> bool:
+    def satisfied(self, counts: Mapping[str, int] | ArrayLike, trials: int) -> bool:
         """Whether every interval of `intervals` is at most ``2 * width`` wide."""
         return all(high - low <= 2.0 * self.width for low, high in self.intervals(counts, trials).values())
+
+
+def _named(counts: Mapping[str, int] | ArrayLike) -> Mapping[str, int]:
+    if isinstance(counts, Mapping):
+        named: Mapping[str, int] = counts
+    else:
+        array = np.asarray(counts)
+        if array.ndim != 1 or len(array) < len(KINDS) or array.dtype.kind not in "iu":
+            raise ScenarioError("counts", counts, "whole numbers: one for each kind of outcome, then for each defender")
+        named = dict(zip(outcome_names(len(array) - len(KINDS)), map(int, array), strict=True))
+    if not named:
+        raise ScenarioError("counts", counts, "one count for each outcome")
+    return named
 
 
 def mixture_interval(successes: int, trials: int, error: float) -> tuple[float, float]:
