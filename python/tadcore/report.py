@@ -21,6 +21,7 @@ from .statistics._outcomes import Floats, indicators
 
 __all__ = ["report"]
 
+_DPI = 220
 _EXAMPLES = 5
 _MOST_INPUTS = 12  # panels of shares by input; the table of inputs lists all of them
 
@@ -70,7 +71,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as base64 of an SVG."""
+    """A figure as base64 of a PNG."""
 
     caption: str
     data: str
@@ -272,15 +273,14 @@ def _provenance(result: Reported) -> Section:
 
 
 def _picture(caption: str, draw: Callable[[Any], Any], what: Any, *, wide: bool = False) -> Picture:
-    """Draw one figure in the house style, as an SVG without a date."""
-    import matplotlib as mpl
+    """Draw one figure in the house style, as a PNG: hatches and curves of many steps make vectors large."""
     import matplotlib.pyplot as plt
 
     from . import plotting
 
     stream = io.BytesIO()
-    with plotting.style(), mpl.rc_context({"svg.hashsalt": "tadcore"}):
+    with plotting.style():
         figure: Any = np.asarray(draw(what), dtype=object).flat[0].figure
-        figure.savefig(stream, format="svg", metadata={"Date": None})
+        figure.savefig(stream, format="png", dpi=_DPI)
         plt.close(figure)
     return Picture(caption, base64.b64encode(stream.getvalue()).decode("ascii"), wide)

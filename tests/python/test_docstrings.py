@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("tadcore._core")
 
 ROOMS = ["", ".scenario", ".scenarios", ".equilibrium", ".network", ".synthesis", ".simulation", ".batch"]
+ROOMS += [".maps", ".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -40,10 +40,10 @@ class OutcomeLook:
 def outcome_look(name: str) -> OutcomeLook:
     """Return how the outcome ``name`` ("timeout", "captured", "intercepted", "d1", …) is drawn."""
     if name == "timeout":
-        return OutcomeLook("timeout", "#666666", (0.97, 0.97, 0.97), "", "v", (0, (1, 1.2)))
+        return OutcomeLook("timeout", "#666666", (0.97, 0.97, 0.97), "", "v", (0, (1, 2.5)))
     if name == "captured":
         who = look("attacker")
-        return OutcomeLook("captured", who.colour, _tint(who.colour, 0.12), r"\\\\", who.marker, (0, (5, 1.5)))
+        return OutcomeLook("captured", who.colour, _tint(who.colour, 0.12), r"\\\\", who.marker, who.dashes)
     if name == "intercepted":
         return OutcomeLook("intercepted", "#000000", (0.75, 0.75, 0.75), "", "o", "-")
     who, i = look(name), int(name.removeprefix("d")) - 1
