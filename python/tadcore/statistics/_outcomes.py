@@ -65,7 +65,18 @@ class TrialOutcomes(Protocol):
 
 
 def outcome_names(n: int) -> tuple[str, ...]:
-    """The outcomes of a game with n defenders, in the order of every table."""
+    """The outcomes of a game, in the order of every table.
+
+    Parameters
+    ----------
+    n : int
+        Number of defenders.
+
+    Returns
+    -------
+    tuple of str
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
+    """
     return (*KINDS, *(f"d{i}" for i in range(1, n + 1)))
 
 
