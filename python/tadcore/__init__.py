@@ -85,15 +85,7 @@ _HOMES = {
     "solve_equilibrium": "equilibrium",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {
-    "cli",
-    "plotting",
-    "report",
-    "reproduce",
-    "scenarios",
-    "sensitivity",
-    "statistics",
-}
+_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "report", "reproduce", "scenarios", "sensitivity"}
 
 
 def __getattr__(name: str) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import as_index
+from ._terminal import bar
 from .batch import simulate_batch
 from .errors import ScenarioError
 from .outcome import OutcomeKind
@@ -159,7 +160,9 @@ def outcome_map(
     kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
     time = np.empty(shape)
     flat: list[NDArray[Any]] = [kind.reshape(-1), defender.reshape(-1), time.reshape(-1)]
-    for block in _blocks(kind.size, show=progress):
+    starts = range(0, kind.size, _BLOCK)
+    for start in bar(starts, f"map of {player}", show=progress):
+        block = slice(start, min(start + _BLOCK, kind.size))
         places = np.arange(block.start, block.stop)
         positions = np.repeat(sc.positions[np.newaxis], len(places), axis=0)
         positions[:, who, 0] = columns[places % len(columns)]
@@ -210,12 +213,3 @@ def _axis(field: str, given: Sequence[Any]) -> NDArray[np.float64]:
     if not all(map(math.isfinite, ends)) or ends[0] > ends[1] or (ends[0] == ends[1]) != (number == 1):
         raise ScenarioError(field, given, "(low, high, count) with low < high, or one place with low = high")
     return np.linspace(*ends, number)
-
-
-def _blocks(size: int, *, show: bool) -> Any:
-    """Slices that cover ``size`` places, with a progress bar where one is wanted and can be seen."""
-    from tqdm.auto import tqdm
-
-    blocks = [slice(start, min(start + _BLOCK, size)) for start in range(0, size, _BLOCK)]
-    # None: tqdm itself stays quiet where the stream is not a terminal
-    return tqdm(blocks, desc="outcome map", unit="block", disable=None if show else True)

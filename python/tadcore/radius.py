@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._breakpoints import Breakpoints, breakpoints
 from ._replays import RadiusKind, Replays, starts_of
+from ._terminal import bar
 from .errors import ScenarioError
 from .statistics import difference_interval, outcome_names, proportion_interval
 from .statistics._outcomes import Floats, Integers, as_level, indicators
@@ -145,6 +146,7 @@ def radius_curve(
     refine: bool = False,
     tolerance: float = 1e-9,
     threads: int | None = None,
+    progress: bool = False,
 ) -> RadiusCurve:
     """Play the same starts at every radius of one player.
 
@@ -171,6 +173,8 @@ def radius_curve(
         How closely.
     threads : int, optional
         Worker threads; all cores by default.
+    progress : bool
+        Whether to show a progress bar, where standard error is a terminal.
 
     Returns
     -------
@@ -191,7 +195,7 @@ def radius_curve(
     if grid.ndim != 1 or grid.size == 0 or np.any(np.diff(grid) <= 0.0):
         raise ScenarioError("radii", radii, "a list of increasing radii")
     own = games.own if reference is None else float(games.checked("reference", reference))
-    played = [games.play(radius) for radius in grid]
+    played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {player}", show=progress)]
     same = np.flatnonzero(grid == own)
     base = played[same[0]] if same.size else games.play(own)
 

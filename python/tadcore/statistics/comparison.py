@@ -84,13 +84,17 @@ class Comparison:
 
     def __repr__(self) -> str:
         rows = [
-            [name, f"{a:,}", f"{b:,}", f"{d:+.4f}", f"{p:.2g}", f"[{low:+.4f}, {high:+.4f}]"]
+            [name, f"{a:,}", f"{b:,}", f"{d:+.4f}", _p_text(p), f"[{low:+.4f}, {high:+.4f}]"]
             for name, a, b, d, p, low, high in zip(
                 self.names, self.only_a, self.only_b, self.difference, self.p_value, self.low, self.high, strict=True
             )
         ]
         head = ["outcome", "only A", "only B", "P(A) - P(B)", "p-value", f"{100 * self.level:g} %"]
         return as_text(f"{self.trials:,} trials, {len(self.flipped):,} flipped", head, rows)
+
+
+def _p_text(p: float) -> str:
+    return f"{p:.2g}" if p > 0.0 else "< 1e-300"  # smaller than any double
 
 
 def compare(a: TrialOutcomes, b: TrialOutcomes, *, level: float = 0.95) -> Comparison:
