@@ -21,11 +21,14 @@ if TYPE_CHECKING:
     from .batch import Batch, simulate_batch
     from .equilibrium import Equilibrium, solve_equilibrium
     from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
+    from .maps import OutcomeMap, outcome_map
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
+    from .radius import RadiusCurve, radius_curve
     from .result import StudyResult, load_study
     from .scenario import Attacker, Defender, Scenario, Target
     from .simulation import Run, simulate
+    from .statistics import HalfWidth
     from .study import Study
     from .sweeps import SweepResult, sweep
     from .synthesis import Gains, synthesize
@@ -36,10 +39,13 @@ __all__ = [
     "Defender",
     "Equilibrium",
     "Gains",
+    "HalfWidth",
     "NetworkChange",
     "NoEquilibriumError",
     "Outcome",
     "OutcomeKind",
+    "OutcomeMap",
+    "RadiusCurve",
     "Run",
     "Scenario",
     "ScenarioError",
@@ -53,6 +59,8 @@ __all__ = [
     "WorkerError",
     "__version__",
     "load_study",
+    "outcome_map",
+    "radius_curve",
     "scenarios",
     "simulate",
     "simulate_batch",
@@ -67,10 +75,13 @@ _HOMES = {
     "Defender": "scenario",
     "Equilibrium": "equilibrium",
     "Gains": "synthesis",
+    "HalfWidth": "statistics",
     "NetworkChange": "network",
     "NoEquilibriumError": "errors",
     "Outcome": "outcome",
     "OutcomeKind": "outcome",
+    "OutcomeMap": "maps",
+    "RadiusCurve": "radius",
     "Run": "simulation",
     "Scenario": "scenario",
     "ScenarioError": "errors",
@@ -84,13 +95,24 @@ _HOMES = {
     "WorkerError": "errors",
     "__version__": "_core",
     "load_study": "result",
+    "outcome_map": "maps",
+    "radius_curve": "radius",
     "simulate": "simulation",
     "simulate_batch": "batch",
     "solve_equilibrium": "equilibrium",
     "sweep": "sweeps",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "sampling", "scenarios", "store"}
+_ROOMS = frozenset(_HOMES.values()) | {
+    "cli",
+    "plotting",
+    "report",
+    "reproduce",
+    "sampling",
+    "scenarios",
+    "sensitivity",
+    "store",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -29,7 +29,7 @@ def refuse_where(field: str, array: NDArray[Any], bad: NDArray[np.bool_], rule: 
         return
     found = np.argwhere(bad)
     errors = [
-        ScenarioError(f"{field}[{', '.join(map(str, where))}]", array[tuple(where)].item(), rule)
+        ScenarioError(f"{field}[{', '.join(map(str, where))}]" if where else field, array[tuple(where)].item(), rule)
         for where in found[:_LISTED].tolist()
     ]
     if len(found) > _LISTED:

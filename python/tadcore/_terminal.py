@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+Item = TypeVar("Item")
 
 
 def say(text: str, *, indent: int = 0) -> None:
@@ -16,6 +19,14 @@ def say(text: str, *, indent: int = 0) -> None:
 def complain(text: str) -> None:
     """Print an error to standard error."""
     _print(_console(stderr=True), f"error: {text}", 0)
+
+
+def bar(items: Sequence[Item], what: str, *, show: bool) -> Iterable[Item]:
+    """The items one by one, with a progress bar where one is wanted and standard error is a terminal."""
+    from tqdm.auto import tqdm
+
+    progress: Iterable[Item] = tqdm(items, desc=what, disable=None if show else True)  # None: quiet in a pipe
+    return progress
 
 
 def _console(*, stderr: bool) -> Console:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import scenarios as bundled
+from ._cli_maps import draw_map, write_report
 from ._cli_study import study
 from ._terminal import complain, say
 from .errors import MISSING, ScenarioError, StoreError, TadcoreError
@@ -86,7 +87,7 @@ def simulate(
     With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
     --plot also the figures, as PNG and PDF.
     """
-    sc = _load(scenario)
+    sc = load_scenario(scenario)
     _usable(out)
     if plot and out is None and not _has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
@@ -151,13 +152,15 @@ def validate(
 
     Every field that breaks a rule is named, with what was found and what it must be.
     """
-    sc = _load(file)
+    sc = load_scenario(file)
     say(f"{file}: valid")
     for line in sc.describe().splitlines():
         say(line, indent=2)
 
 
 app.command(short_help="Play many games from a study file.")(study)
+app.command(name="map", short_help="Draw the outcome over one player's start.")(draw_map)
+app.command(name="report", short_help="Write a finished study as an HTML page.")(write_report)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -182,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(_BAD_INPUT)
 
 
-def _load(source: str) -> Scenario:
+def load_scenario(source: str) -> Scenario:
     """A scenario from a file, or else the bundled one of that name."""
     from .scenario import Scenario
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import polars
 
     from .scenario import Scenario
+    from .statistics import Comparison, Incidence, OutcomeProbabilities
     from .study import Study
 
 __all__ = ["StudyResult", "load_study"]
@@ -124,6 +125,58 @@ class StudyResult:
             There is no such trial.
         """
         return simulate(self.setup(trial))
+
+    def probabilities(self, *, level: float = 0.95, method: Literal["wilson", "exact"] = "wilson") -> OutcomeProbabilities:
+        """How often each outcome came, with intervals: see `tadcore.statistics.probabilities`.
+
+        Parameters
+        ----------
+        level : float, optional
+            Confidence level of each interval.
+        method : {"wilson", "exact"}, optional
+            Wilson's score interval or Clopper and Pearson's exact one.
+        """
+        from .statistics import probabilities
+
+        return probabilities(self.kind, self.defender, self.scenario.n, level=level, method=method)
+
+    def incidence(self, *, level: float = 0.95, jointly: bool = False) -> Incidence:
+        """When each outcome came, as cumulative curves with bands: see `tadcore.statistics.incidence`.
+
+        Parameters
+        ----------
+        level : float, optional
+            Confidence level of each band over all instants.
+        jointly : bool, optional
+            Whether the bands hold for all curves at once.
+        """
+        from .statistics import incidence
+
+        sc = self.scenario
+        return incidence(
+            self.kind,
+            self.defender,
+            self.time,
+            horizon=sc.horizon,
+            step=sc.step,
+            n=sc.n,
+            level=level,
+            jointly=jointly,
+        )
+
+    def compare(self, other: StudyResult, *, level: float = 0.95) -> Comparison:
+        """This study beside another on the same draws, trial by trial: see `tadcore.statistics.compare`.
+
+        Parameters
+        ----------
+        other : StudyResult
+            A study of the same seed and trials over a game that differs.
+        level : float, optional
+            Confidence level of each interval.
+        """
+        from .statistics import compare
+
+        return compare(self, other, level=level)
 
     def to_pandas(self) -> pandas.DataFrame:
         """The table as a pandas data frame."""

@@ -229,6 +229,9 @@ class Study:
             raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")
         if until is not None and not isinstance(until, StoppingRule):
             raise ScenarioError("until", until, "a stopping rule such as tadcore.statistics.HalfWidth(0.002)")
+        if until is not None and self.design != "random":
+            rule = "left out: its interval needs independent draws, which only design='random' gives"
+            raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
         self._plan.check_ahead(self.trials)
         game_of(self.scenario).equilibrium()
         schema = schema_of(self.columns)

@@ -9,6 +9,7 @@ pytest.importorskip("tadcore._core")
 
 ROOMS = ["", ".scenario", ".scenarios", ".equilibrium", ".network", ".synthesis", ".simulation", ".batch"]
 ROOMS += [".sampling", ".study", ".sweeps"]
+ROOMS += [".maps", ".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -1,4 +1,4 @@
-"""Figures of a run, as the field prints them.
+"""Figures of runs and of studies, as the field prints them.
 
 Every function draws in the axes it is given, or in new ones, and returns them; none changes a global setting. Figures
 read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
@@ -10,6 +10,9 @@ from ._save import save
 from ._series import MAX_VERTICALS, controls, distances, theta
 from ._style import COLUMN, PAGE, style
 from ._trajectories import MAX_EDGE_LABELS, trajectories
+from .maps import outcome_map
+from .shares import outcomes_by_input, outcomes_by_inputs
+from .studies import comparison, incidence, outcome_probabilities, radius_curve, sensitivity
 
 __all__ = [
     "COLUMN",
@@ -17,10 +20,18 @@ __all__ = [
     "MAX_VERTICALS",
     "PAGE",
     "Labels",
+    "comparison",
     "controls",
     "distances",
+    "incidence",
     "network",
+    "outcome_map",
+    "outcome_probabilities",
+    "outcomes_by_input",
+    "outcomes_by_inputs",
+    "radius_curve",
     "save",
+    "sensitivity",
     "style",
     "theta",
     "trajectories",

@@ -1,0 +1,28 @@
+"""What the trials of a study say: probabilities, incidence, comparisons, and when to stop.
+
+Every function takes plain arrays of outcomes, or the result of a study, and returns a small object that prints as a
+table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
+"""
+
+from ._outcomes import TrialOutcomes, outcome_counts, outcome_names
+from .comparison import Comparison, compare, difference_interval, paired
+from .incidence import Incidence, incidence
+from .intervals import OutcomeProbabilities, probabilities, proportion_interval
+from .sequences import HalfWidth, mixture_interval
+
+__all__ = [
+    "Comparison",
+    "HalfWidth",
+    "Incidence",
+    "OutcomeProbabilities",
+    "TrialOutcomes",
+    "compare",
+    "difference_interval",
+    "incidence",
+    "mixture_interval",
+    "outcome_counts",
+    "outcome_names",
+    "paired",
+    "probabilities",
+    "proportion_interval",
+]
