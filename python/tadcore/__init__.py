@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from ._core import __version__
     from .batch import Batch, simulate_batch
     from .equilibrium import Equilibrium, solve_equilibrium
-    from .errors import NoEquilibriumError, ScenarioError, TadcoreError
+    from .errors import NoEquilibriumError, ScenarioError, TadcoreError, VerificationError
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
     from .scenario import Attacker, Defender, Scenario, Target
     from .simulation import Run, simulate
     from .synthesis import Gains, synthesize
+    from .verification import VerificationReport, verify
 
 __all__ = [
     "Attacker",
@@ -41,6 +42,8 @@ __all__ = [
     "ScenarioError",
     "TadcoreError",
     "Target",
+    "VerificationError",
+    "VerificationReport",
     "VisibilityNetwork",
     "__version__",
     "scenarios",
@@ -48,6 +51,7 @@ __all__ = [
     "simulate_batch",
     "solve_equilibrium",
     "synthesize",
+    "verify",
 ]
 
 _HOMES = {
@@ -65,12 +69,15 @@ _HOMES = {
     "ScenarioError": "errors",
     "TadcoreError": "errors",
     "Target": "scenario",
+    "VerificationError": "errors",
+    "VerificationReport": "verification",
     "VisibilityNetwork": "network",
     "__version__": "_core",
     "simulate": "simulation",
     "simulate_batch": "batch",
     "solve_equilibrium": "equilibrium",
     "synthesize": "synthesis",
+    "verify": "verification",
 }
 _ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "scenarios"}
 

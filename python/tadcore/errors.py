@@ -13,7 +13,7 @@ import reprlib
 from collections.abc import Iterable
 from decimal import Decimal
 
-__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "TadcoreError"]
+__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "TadcoreError", "VerificationError"]
 
 
 class Missing(enum.Enum):
@@ -139,6 +139,34 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.escape_time, self.horizon, self.step)
+
+
+class VerificationError(TadcoreError, AssertionError):
+    """A check of `tadcore.verify` that did not pass.
+
+    Parameters
+    ----------
+    check : str
+        Name of the check, such as ``"fne.regret.target"``.
+    value, bound : float
+        What was measured, and the most that is accepted.
+    remedy : str
+        What to do about it.
+    converged : bool
+        Whether the numbers behind the check can be relied on; False says that the check is undecided.
+    """
+
+    def __init__(self, check: str, value: float, bound: float, remedy: str, converged: bool = True) -> None:
+        super().__init__(check, value, bound, remedy, converged)
+        self.check = check
+        self.value = value
+        self.bound = bound
+        self.remedy = remedy
+        self.converged = converged
+
+    def __str__(self) -> str:
+        state = "not accepted" if self.converged else "not converged"
+        return f"{self.check}: {state}, measured {self.value:.3g} where at most {self.bound:.3g} passes; {self.remedy}"
 
 
 def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:
