@@ -141,6 +141,10 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
         return type(self), (self.escape_time, self.horizon, self.step)
 
 
+UNDECIDED = "the measurement is not accurate enough to decide: try a smaller step"
+"""The remedy of a check whose numerics have not converged."""
+
+
 class VerificationError(TadcoreError, AssertionError):
     """A check of `tadcore.verify` that did not pass.
 
@@ -165,8 +169,8 @@ class VerificationError(TadcoreError, AssertionError):
         self.converged = converged
 
     def __str__(self) -> str:
-        state = "not accepted" if self.converged else "not converged"
-        return f"{self.check}: {state}, measured {self.value:.3g} where at most {self.bound:.3g} passes; {self.remedy}"
+        state, advice = ("not accepted", self.remedy) if self.converged else ("not converged", UNDECIDED)
+        return f"{self.check}: {state}, measured {self.value:.3g} where at most {self.bound:.3g} passes; {advice}"
 
 
 def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:

@@ -17,6 +17,11 @@ from ._matrices import Floats, Matrices
 NODES = 5
 """Gauss nodes in a step: order 10."""
 _CHUNK_BYTES = 64 * 2**20
+_MOST_CALLS = 600
+
+
+class _TooStiffError(Exception):
+    """One step of the Riccati flow took more evaluations than any solution that exists needs."""
 
 
 @cache
@@ -27,7 +32,7 @@ def gauss(q: int = NODES) -> tuple[Floats, Floats, Floats]:
     powers = np.arange(q)
     # a integrates every polynomial of degree below q exactly: Σ_j a_ij c_j^m = c_i^(m+1) / (m+1)
     at, integrals = c[:, None] ** powers, c[:, None] ** (powers + 1) / (powers + 1)
-    a = np.linalg.solve(at.T, integrals.T).T
+    a = np.asarray(np.linalg.solve(at.T, integrals.T).T, dtype=np.float64)
     return c, np.asarray(0.5 * w, dtype=np.float64), a
 
 
@@ -52,29 +57,40 @@ def riccati_within(m: Matrices, right: Floats, step: float, *, rtol: float = 1e-
     left : ndarray, shape (parties, k, N, N)
         At the left ends. None is returned in place of both where the integration breaks down.
     """
-    c = gauss()[0]
     parties, count, size, _ = right.shape
     chunk = max(_CHUNK_BYTES // (8 * 16 * parties * size * size), 1)
-    nodes = np.empty((parties, count, len(c), size, size))
+    nodes = np.empty((parties, count, NODES, size, size))
     left = np.empty_like(right)
     for first in range(0, count, chunk):
-        part = right[:, first : first + chunk]
-
-        def backward(_s: float, y: Floats, shape: tuple[int, ...] = part.shape) -> Floats:
-            return -m.slope(y.reshape(shape)).ravel()
-
-        asked = np.append((1.0 - c[::-1]), 1.0) * step
-        scale = max(float(np.max(np.abs(part))), 1e-300)
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = solve_ivp(
-                backward, (0.0, step), part.ravel(), method="DOP853", t_eval=asked, rtol=rtol, atol=rtol * scale
-            )
-        if not found.success or not np.isfinite(found.y).all():
+        at = _back_one_step(m, right[:, first : first + chunk], step, rtol)
+        if at is None:
             return None
-        at = np.moveaxis(found.y.reshape(*part.shape, -1), -1, 2)
         nodes[:, first : first + chunk] = at[:, :, -2::-1]
         left[:, first : first + chunk] = at[:, :, -1]
     return nodes, left
+
+
+def _back_one_step(m: Matrices, right: Floats, step: float, rtol: float) -> Floats | None:
+    """P from right ends to left ends: at the nodes, last first, and at the left ends; None where it breaks down."""
+    calls = iter(range(_MOST_CALLS))
+
+    def backward(_s: float, y: Floats) -> Floats:
+        if next(calls, None) is None:
+            raise _TooStiffError
+        return -m.slope(y.reshape(right.shape)).ravel()
+
+    asked = np.append(1.0 - gauss()[0][::-1], 1.0) * step
+    small = rtol * max(float(np.abs(right).max()), 1e-300)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = solve_ivp(
+                backward, (0.0, step), right.ravel(), method="DOP853", t_eval=asked, rtol=rtol, atol=small
+            )
+    except _TooStiffError:
+        return None
+    if not found.success or not np.isfinite(found.y).all():
+        return None
+    return np.moveaxis(found.y.reshape(*right.shape, -1), -1, 2)
 
 
 def propagate(loop: Callable[[slice], Floats], count: int, start: Floats, step: float) -> tuple[Floats, Floats]:

@@ -163,7 +163,8 @@ class Adapted:
             full = np.einsum("kqij,ab->kqiajb", C, np.eye(dim)).copy()
             through = self.m.B[:, deviation.player]
             full += np.einsum("i,kajb->kiajb", through, deviation.gain[part])[:, None]
-            return full.reshape(len(C), q, size * dim, size * dim)
+            joint: Floats = full.reshape(len(C), q, size * dim, size * dim)
+            return joint
 
         start = self.start if deviation is None else self.start.reshape(-1, 1)
         nodes, ends = propagate(loop, self.steps, start, self.step)
@@ -191,7 +192,10 @@ class Adapted:
         tuple of Index
             One for each index of the theorem.
         """
-        rows = self.played if sampled else self.profile
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is inf or nan in the result
+            return self._index(self.played if sampled else self.profile, deviation)
+
+    def _index(self, rows: Floats, deviation: Deviation | None) -> tuple[Index, ...]:
         z, ends = self.states(rows, deviation)
         u = rows @ z
         if deviation is not None:

@@ -72,9 +72,9 @@ def check_nafne(
                 notes.append(f"{label} sees nobody in this run and can only stand still: it has no deviation")
                 break
             index = adapted.index(sampled=False, deviation=deviation)[party]
-            largest = max(largest, index.error)
+            largest = float(np.maximum(largest, index.error))  # nan stays
             resolved &= index.converged
-            gain = max(gain, -sign * (index.value - index.initial) / max(index.scale, 1e-300))
+            gain = float(np.maximum(gain, -sign * (index.value - index.initial) / max(index.scale, 1e-300)))
         else:
             if deviations:
                 checks.append(Check(f"nafne.deviation.{label}", largest, _IDENTITY, resolved, _REMEDY, identity))

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from tadcore.errors import VerificationError
+from tadcore.errors import UNDECIDED, VerificationError
 
 __all__ = ["Check", "Measurement", "VerificationReport"]
 
@@ -154,7 +154,7 @@ class VerificationReport:
             detail = f"  [{c.detail}]" if c.detail else ""
             lines.append(f"  {c.name:<{width}}  {c.value:9.2e} ≤ {c.bound:8.1e}  {state}  ({c.source}){detail}")
             if not c.ok:
-                lines.append(f"  {'':<{width}}  → {c.remedy}")
+                lines.append(f"  {'':<{width}}  → {c.remedy if c.converged else UNDECIDED}")
         lines += [f"  {m.name:<{width}}  {m.value:9.4g}  {m.meaning}" for m in self.measurements]
         return lines + [f"  note: {note}" for note in self.notes]
 
