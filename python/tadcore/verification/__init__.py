@@ -11,6 +11,10 @@ room                        what it answers
 ``record``                  is the record what the equations say
 ``consistency``             full sight gives the equilibrium (thm:consistency); how far the indices are from the own
 ``gains``, ``objective``    gradient, curvature in full blocks, other starts, how often certificates hold
+``geometry``                straight line (thm:straight_line), radius delay (thm:delayproperty), symmetries
+``steps``, ``events``       δ, δ/2, δ/4; chattering; the continuous game by its event times, sliding modes included
+``externality``             the jump of every player's control at every change of the network
+``decentral``               the synthesis as a protocol between players (rem:networkexternality)
 ==========================  =====================================================================================
 
 Everything here is computed by NumPy and SciPy from the scenario's weights and the record.
@@ -26,12 +30,17 @@ from tadcore.simulation import Run, simulate
 
 from .adapted import Adapted, Deviation, Index
 from .consistency import check_consistency, index_distance
+from .decentral import Decentralised, check_decentral, decentralise
+from .events import Event, EventPlay, play_by_events
+from .externality import control_jumps
 from .fne import BestResponse, best_responses, check_equilibrium, riccati_defect
 from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
+from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
 from .indices import AdaptedWeights, adapted_weights
 from .nafne import check_nafne, gap_order, sampling_gap
 from .record import check_record
 from .report import Check, Measurement, VerificationReport, combine
+from .steps import Chatter, Refinement, StepStudy, chatter, check_steps, refine_batch, step_study
 
 if TYPE_CHECKING:
     from tadcore.scenario import Scenario
@@ -41,26 +50,45 @@ __all__ = [
     "AdaptedWeights",
     "BestResponse",
     "CertificateRates",
+    "Chatter",
     "Check",
+    "Decentralised",
     "Deviation",
+    "Event",
+    "EventPlay",
     "Index",
     "Measurement",
+    "Refinement",
+    "StepStudy",
     "VerificationError",
     "VerificationReport",
     "adapted_weights",
     "best_responses",
     "certificate_rates",
+    "chatter",
     "check_consistency",
+    "check_decentral",
     "check_equilibrium",
     "check_gains",
+    "check_geometry",
     "check_nafne",
     "check_record",
+    "check_steps",
+    "control_jumps",
+    "decentralise",
     "gap_order",
     "index_distance",
     "lowest_curvature",
+    "moved",
     "multistart",
+    "off_the_line",
+    "play_by_events",
+    "radius_delay",
+    "refine_batch",
+    "relabelled",
     "riccati_defect",
     "sampling_gap",
+    "step_study",
     "verify",
 ]
 
@@ -120,5 +148,8 @@ def verify(
         check_nafne(run, equilibrium, deviations=deviations, seed=seed),
         check_consistency(run, equilibrium),
         check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed),
+        check_geometry(run, seed=seed),
+        check_decentral(run),
+        check_steps(run),
     ]
     return combine(title, parts)

@@ -20,8 +20,8 @@ _CHUNK_BYTES = 64 * 2**20
 _MOST_CALLS = 600
 
 
-class _TooStiffError(Exception):
-    """One step of the Riccati flow took more evaluations than any solution that exists needs."""
+class TooStiffError(Exception):
+    """An integration took more evaluations than any solution that exists needs."""
 
 
 @cache
@@ -76,7 +76,7 @@ def _back_one_step(m: Matrices, right: Floats, step: float, rtol: float) -> Floa
 
     def backward(_s: float, y: Floats) -> Floats:
         if next(calls, None) is None:
-            raise _TooStiffError
+            raise TooStiffError
         return -m.slope(y.reshape(right.shape)).ravel()
 
     asked = np.append(1.0 - gauss()[0][::-1], 1.0) * step
@@ -86,11 +86,11 @@ def _back_one_step(m: Matrices, right: Floats, step: float, rtol: float) -> Floa
             found = solve_ivp(
                 backward, (0.0, step), right.ravel(), method="DOP853", t_eval=asked, rtol=rtol, atol=small
             )
-    except _TooStiffError:
+    except TooStiffError:
         return None
     if not found.success or not np.isfinite(found.y).all():
         return None
-    return np.moveaxis(found.y.reshape(*right.shape, -1), -1, 2)
+    return np.asarray(np.moveaxis(found.y.reshape(*right.shape, -1), -1, 2), dtype=np.float64)
 
 
 def propagate(loop: Callable[[slice], Floats], count: int, start: Floats, step: float) -> tuple[Floats, Floats]:

@@ -26,7 +26,7 @@ from scipy.interpolate import make_interp_spline
 
 from tadcore.equilibrium import solve_equilibrium
 
-from ._flow import riccati_within
+from ._flow import TooStiffError, riccati_within
 from ._matrices import FeedbackSolution, Floats, Matrices, matrices_of, stacked_rows
 from .report import Check, Measurement, VerificationReport
 
@@ -143,7 +143,11 @@ def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z:
     S = Bp @ np.diag(1.0 / m.r[own]) @ Bp.T
     limit = _ESCAPED * max(1.0, float(np.abs(m.F[p]).max()), float(np.abs(m.Q[p]).max()))
 
+    calls = iter(range(_MOST_CALLS))
+
     def backward(s: float, y: Floats) -> Floats:
+        if next(calls, None) is None:
+            raise TooStiffError
         kept, best = y.reshape(2, size, size)
         G = np.asarray(spline(sc.horizon - s))
         C = m.B @ G
@@ -157,22 +161,22 @@ def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z:
         down = best_A + best_A.T - best @ S @ best + free
         return np.concatenate([up.ravel(), down.ravel()])
 
-    calls = iter(range(_MOST_CALLS))
-
     def escaped(_s: float, y: Floats) -> float:
-        lost = next(calls, None) is None  # a bound on the work: too stiff to follow is not converged
-        return -1.0 if lost else limit - float(np.abs(y).max())
+        return limit - float(np.abs(y).max())
 
     escaped.terminal = True  # type: ignore[attr-defined]
     scale = max(float(np.abs(m.F[p]).max()), float(np.abs(m.Q[p]).max()) * sc.horizon)
     start = np.concatenate([m.F[p].ravel(), m.F[p].ravel()])
-    found = solve_ivp(
-        backward, (0.0, sc.horizon), start, method="DOP853", rtol=_RTOL, atol=_RTOL * scale, events=escaped
-    )
+    try:
+        found = solve_ivp(
+            backward, (0.0, sc.horizon), start, method="DOP853", rtol=_RTOL, atol=_RTOL * scale, events=escaped
+        )
+    except TooStiffError:
+        return BestResponse(m.parties[p], np.nan, np.nan, False)
     kept, best = found.y[:, -1].reshape(2, size, size)
     cost = 0.5 * float(np.sum(z * (kept @ z)))
     if found.status == 1:
-        return BestResponse(m.parties[p], cost, -np.inf, next(calls, None) is not None)
+        return BestResponse(m.parties[p], cost, -np.inf, True)
     return BestResponse(m.parties[p], cost, 0.5 * float(np.sum(z * (best @ z))), bool(found.success))
 
 

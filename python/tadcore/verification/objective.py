@@ -97,15 +97,20 @@ class FullObjective:
 
     def theta(self, x: Floats) -> float:
         """Θ over the number of axes."""
-        S, dQ = self.errors(self.rows(x))
+        return self.theta_of(self.rows(x))
+
+    def theta_of(self, G: Floats) -> float:
+        """Θ of joint rows G, over the number of axes."""
+        S, dQ = self.errors(G)
         total = sum(g * float(np.sum(X * X)) for g, X in zip(self.gamma, dQ, strict=False))
         return float(total + np.sum(self.weight * S * S)) / self.dim
 
     def gradient(self, x: Floats) -> Floats:
         """∇Θ in the blocks (eq:errgradient), over the number of axes."""
-        return self.pull(self._inner(self.rows(x))) / self.dim
+        return self.pull(self.inner(self.rows(x))) / self.dim
 
-    def _inner(self, G: Floats) -> Floats:
+    def inner(self, G: Floats) -> Floats:
+        """The gradient of Θ in G, before it is pulled back to the blocks."""
         S, dQ = self.errors(G)
         sign = 1.0 if self.first else -1.0
         inner = 4.0 * sign * self.gamma[0] * (self.R * G) @ dQ[0] + 2.0 * self.weight * self.R * S
@@ -127,7 +132,11 @@ class FullObjective:
 
     def hessian_product(self, x: Floats, v: Floats) -> Floats:
         """∇²Θ(x) v for directions v of shape (…, unknowns), exactly."""
-        G, V = self.rows(x), self.rows(v)
+        return self.curve(self.rows(x), v)
+
+    def curve(self, G: Floats, v: Floats) -> Floats:
+        """The same at joint rows G of any kind, for directions in the blocks."""
+        V = self.rows(v)
         _, dQ = self.errors(G)
         sign = 1.0 if self.first else -1.0
         change = np.swapaxes(V, -1, -2) @ (self.R * G)
