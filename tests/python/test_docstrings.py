@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("tadcore._core")
 
 ROOMS = ["", ".scenario", ".scenarios", ".equilibrium", ".network", ".synthesis", ".simulation", ".batch"]
+ROOMS += [".verification", ".verification.events"]
 
 
 @pytest.mark.parametrize("room", ROOMS)

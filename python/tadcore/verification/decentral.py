@@ -85,8 +85,8 @@ class Decentralised:
     def __repr__(self) -> str:
         state = "silent" if self.converged else "still talking"
         return (
-            f"Decentralised(Θ={self.theta:.6g}, {self.gap:.1e} above the central one, {state} after "
-            f"{self.rounds} rounds, {self.messages:,} messages, {self.scalars:,} numbers, rows up to {self.staleness} rounds old)"
+            f"Decentralised(Θ={self.theta:.6g}, {self.gap:.1e} above the central one, {state} after {self.rounds} "
+            f"rounds, {self.messages:,} messages, {self.scalars:,} numbers, rows up to {self.staleness} rounds old)"
         )
 
 

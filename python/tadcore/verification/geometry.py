@@ -2,8 +2,8 @@
 
 Theorem straight_line (I1, λ = 0): the attacker and the target stay on the line that joins them at t = 0. Theorem
 delayproperty: two games that differ in one player's visibility radius are the same, here to the bit, until that
-player's first edge in either. A game that is turned, mirrored or moved is the same game, turned, mirrored or moved; one whose
-defenders are renamed, the same with other names.
+player's first edge in either. A game that is turned, mirrored or moved is the same game, turned, mirrored or
+moved; one whose defenders are renamed, the same with other names.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """What depends on δ: the outcome, its time, the network changes, and edges that chatter.
 
 Termination, network and gains are looked at on the grid, so every time in a result is a multiple of δ. An event of the
-continuous game lies up to a step before it, and a graze can be missed. And where the control with an edge drives two players apart and the control without it brings them back, the edge flips at almost every instant: a
-sliding mode of the continuous game. `tadcore.verification.play_by_events` follows both in continuous time.
+continuous game lies up to a step before it, and a graze can be missed. And where the control with an edge drives two
+players apart and the control without it brings them back, the edge flips at almost every instant: a sliding mode of the
+continuous game. `tadcore.verification.play_by_events` follows both in continuous time.
 """
 
 from __future__ import annotations
