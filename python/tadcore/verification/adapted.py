@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Adapted", "Deviation", "Index"]
 
+_PIECES = 64
+
 
 @dataclass(frozen=True)
 class Index:
@@ -112,69 +114,88 @@ class Adapted:
     def __init__(self, run: Run, equilibrium: FeedbackSolution | None = None) -> None:
         sc = run.scenario
         self.run, self.sc = run, sc
-        self.steps = len(run.times) - 1
-        if self.steps < 1:
-            raise ScenarioError("run", f"{self.steps} steps", "a game that is not over at t = 0")
+        self.length = len(run.times) - 1
+        if self.length < 1:
+            raise ScenarioError("run", f"{self.length} steps", "a game that is not over at t = 0")
         self.m: Matrices = matrices_of(sc)
-        self.step = sc.horizon / sc.steps
         eq = solve_equilibrium(sc) if equilibrium is None else equilibrium
-        self.grid = self.m.values(eq.P)[:, : self.steps + 1]
-        inside = riccati_within(self.m, self.grid[:, 1:], self.step)
-        if inside is None:
-            raise ArithmeticError("the Riccati equation escapes inside a step: the values given do not solve it")
-        self.inside = inside[0]
-        self.gains = run.gains[: self.steps]
+        self.grid = self.m.values(eq.P)[:, : self.length + 1]
+        self.gains = run.gains[: self.length]
         self.start = run.position[0, :-1] - run.position[0, -1]
+        # a stiff step is cut into pieces, each with its own nodes
+        speed = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max())
+        self.pieces = int(np.clip(np.ceil(4.0 * speed * sc.horizon / sc.steps), 1, _PIECES))
+        self.step = sc.horizon / sc.steps / self.pieces
+        self.steps = self.length * self.pieces
+        self.inside = self._values_inside()
+
+    def _values_inside(self) -> Floats:
+        """P at every node, shape (parties, L · pieces, q, N, N)."""
+        right, found = self.grid[:, 1:], []
+        for _ in range(self.pieces):
+            inside = riccati_within(self.m, right, self.step)
+            if inside is None:
+                raise ArithmeticError("the Riccati equation escapes inside a step: the values given do not solve it")
+            found.append(inside[0])
+            right = inside[1]
+        by_piece = np.stack(found[::-1], axis=2)
+        return by_piece.reshape(len(by_piece), self.steps, *by_piece.shape[3:])
+
+    def _frozen(self) -> Floats:
+        """Rows in force over every step, shape (L, n + 2, N)."""
+        rows = self.m.rows(self.grid[:, : self.length])
+        rows[:, : self.gains.shape[1]] = self.gains
+        return rows
 
     @cached_property
     def weights(self) -> AdaptedWeights:
-        """S and ΔQ^Ad at every Gauss node, shapes (L, q, m, N) and (indices, L, q, N, N)."""
-        G = np.broadcast_to(self.gains[:, None], (*self.inside.shape[1:3], *self.gains.shape[1:]))
+        """S and ΔQ^Ad at every Gauss node, shapes (L · pieces, q, m, N) and (indices, L · pieces, q, N, N)."""
+        gains = np.repeat(self.gains, self.pieces, axis=0)[:, None]
+        G = np.broadcast_to(gains, (*self.inside.shape[1:3], *self.gains.shape[1:]))
         return adapted_weights(self.sc, self.m, self.inside, G)
 
     @cached_property
     def weights_on_grid(self) -> AdaptedWeights:
         """S and ΔQ^Ad at t_0 … t_{L-1}."""
-        return adapted_weights(self.sc, self.m, self.grid[:, : self.steps], self.gains)
+        return adapted_weights(self.sc, self.m, self.grid[:, : self.length], self.gains)
 
     @cached_property
     def profile(self) -> Floats:
-        """Rows of γ at every node, shape (L, q, n + 2, N): the run's gains, and P(t) for those who see everything."""
+        """Rows of γ at every node, shape (L · pieces, q, n + 2, N): the run's gains, and P(t) for the others."""
         rows = self.m.rows(self.inside)
-        rows[:, :, : self.gains.shape[1]] = self.gains[:, None]
+        rows[:, :, : self.gains.shape[1]] = np.repeat(self.gains, self.pieces, axis=0)[:, None]
         return rows
 
     @cached_property
     def played(self) -> Floats:
-        """Rows in force in the run, shape (L, 1, n + 2, N): everything frozen at the step's start."""
-        rows = self.m.rows(self.grid[:, : self.steps])
-        rows[:, : self.gains.shape[1]] = self.gains
-        frozen: Floats = rows[:, None]
+        """Rows in force in the run, shape (L · pieces, 1, n + 2, N): everything frozen at the step's start."""
+        frozen: Floats = np.repeat(self._frozen(), self.pieces, axis=0)[:, None]
         return frozen
 
     def states(self, rows: Floats, deviation: Deviation | None = None) -> tuple[Floats, Floats]:
-        """The state at nodes (L, q, N, dim) and instants (L + 1, N, dim) under rows (L, 1 or q, n + 2, N)."""
+        """The state at nodes and at the L + 1 instants under rows of shape (L · pieces, 1 or q, n + 2, N)."""
         q, size, dim = self.inside.shape[2], self.m.size, self.sc.dim
+        added = None if deviation is None else np.repeat(deviation.gain, self.pieces, axis=0)
 
         def loop(part: slice) -> Floats:
             C = np.broadcast_to(self.m.B @ rows[part], (len(rows[part]), q, size, size))
-            if deviation is None:
+            if deviation is None or added is None:
                 return C
             full = np.einsum("kqij,ab->kqiajb", C, np.eye(dim)).copy()
             through = self.m.B[:, deviation.player]
-            full += np.einsum("i,kajb->kiajb", through, deviation.gain[part])[:, None]
+            full += np.einsum("i,kajb->kiajb", through, added[part])[:, None]
             joint: Floats = full.reshape(len(C), q, size * dim, size * dim)
             return joint
 
         start = self.start if deviation is None else self.start.reshape(-1, 1)
         nodes, ends = propagate(loop, self.steps, start, self.step)
-        return nodes.reshape(self.steps, q, size, dim), ends.reshape(self.steps + 1, size, dim)
+        return nodes.reshape(self.steps, q, size, dim), ends[:: self.pieces].reshape(self.length + 1, size, dim)
 
     def _resolved(self, rows: Floats, deviation: Deviation | None) -> bool:
         """Whether ‖C‖δ ≤ 1: collocation of order 10 then errs by less than 1e-12 on a step."""
         largest = np.abs(self.m.B @ rows).sum(axis=-1).max(axis=(1, 2))
         if deviation is not None:
-            largest = largest + np.abs(deviation.gain).sum(axis=(2, 3)).max(axis=1)
+            largest = largest + np.repeat(np.abs(deviation.gain).sum(axis=(2, 3)).max(axis=1), self.pieces)
         return float(largest.max()) * self.step <= 1.0
 
     def index(self, *, sampled: bool, deviation: Deviation | None = None) -> tuple[Index, ...]:
@@ -199,7 +220,7 @@ class Adapted:
         z, ends = self.states(rows, deviation)
         u = rows @ z
         if deviation is not None:
-            u[:, :, deviation.player] += np.einsum("kajb,kqjb->kqa", deviation.gain, z)
+            u[:, :, deviation.player] += np.einsum("kajb,kqjb->kqa", np.repeat(deviation.gain, self.pieces, axis=0), z)
         off = u - self.profile @ z
         inside = integrands(self.sc, self.m, self.weights, z, u)
         zero_sum = self.sc.interaction == "I2"
@@ -250,10 +271,10 @@ class Adapted:
         dim, N = self.sc.dim, self.m.size
         reach = size * float(np.abs(self.played).max())
         base, swing = rng.normal(scale=reach, size=(2, dim, N, dim))
-        phase = rng.uniform(0.0, 2.0 * np.pi) + 4.0 * np.pi * self.run.times[: self.steps] / self.sc.horizon
+        phase = rng.uniform(0.0, 2.0 * np.pi) + 4.0 * np.pi * self.run.times[: self.length] / self.sc.horizon
         K = base + np.cos(phase)[:, None, None, None] * swing
         if player < self.gains.shape[1]:
-            sees = self.run.adjacency[: self.steps, player]
+            sees = self.run.adjacency[: self.length, player]
             if not sees.any():
                 return None
             K = K * sees[:, None, :, None]

@@ -38,7 +38,7 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     """
     sc = run.scenario
     adapted = Adapted(run, equilibrium)
-    length, m = adapted.steps, len(sc.constrained)
+    length, m = adapted.length, len(sc.constrained)
     z = run.position[:, :-1] - run.position[:, -1:]
     extent = max(float(np.abs(z).max()), 1e-300)
     checks = [_network(run)]
