@@ -141,7 +141,7 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
         return type(self), (self.escape_time, self.horizon, self.step)
 
 
-UNDECIDED = "the measurement is not accurate enough to decide: try a smaller step"
+UNDECIDED = "the measurement is not accurate enough to decide: a smaller step or a shorter horizon may help"
 """The remedy of a check whose numerics have not converged."""
 
 

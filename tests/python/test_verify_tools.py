@@ -78,11 +78,20 @@ def test_another_ending_is_infinitely_unlike():
     assert geometry.unlike(run, other, run.position, 0) == np.inf
 
 
-def test_a_game_on_the_rim_cannot_decide_a_symmetry():
+def test_a_game_on_the_rim_cannot_decide_a_symmetry(monkeypatch):
     """Exactly at a visibility radius rounding decides, so the checks are not converged."""
     sc = tadcore.scenarios.load("paper-i1").replace({"defenders[0].visibility_radius": float(np.hypot(2.0, 2.0))})
-    report = v.check_geometry(tadcore.simulate(sc))
-    assert not report["geometry.rotation"].converged
+    run = tadcore.simulate(sc)
+    real = geometry.simulate
+
+    def flipped(moved):
+        other = real(moved)
+        return dataclasses.replace(other, outcome=dataclasses.replace(other.outcome, time=0.0))
+
+    monkeypatch.setattr(geometry, "simulate", flipped)
+    assert not v.check_geometry(run)["geometry.rotation"].converged
+    away = tadcore.simulate(sc.replace({"defenders[0].visibility_radius": 2.9}))
+    assert v.check_geometry(away)["geometry.rotation"].converged  # there it is a failure
 
 
 # ---- steps

@@ -124,7 +124,7 @@ class Adapted:
         self.start = run.position[0, :-1] - run.position[0, -1]
         # a stiff step is cut into pieces, each with its own nodes
         speed = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max())
-        self.pieces = int(np.clip(np.ceil(4.0 * speed * sc.horizon / sc.steps), 1, _PIECES))
+        self.pieces = int(np.clip(np.ceil(8.0 * speed * sc.horizon / sc.steps), 1, _PIECES))
         self.step = sc.horizon / sc.steps / self.pieces
         self.steps = self.length * self.pieces
         self.inside = self._values_inside()

@@ -55,7 +55,7 @@ class BestResponse:
     best : float
         J of its best response; -inf where it can win without bound.
     converged : bool
-        Whether the integration reached its tolerance.
+        Whether the integration reached its tolerance and two tolerances agree.
     """
 
     party: str
@@ -115,8 +115,20 @@ def best_responses(sc: Scenario, feedback: Floats) -> tuple[BestResponse, ...]:
     spline = _spline(sc, feedback)
     smooth = _interpolation_error(sc, feedback) ** 2 <= 0.1 * _REGRET  # a regret is quadratic in the gains' error
     z = sc.positions[:-1] - sc.positions[-1]
-    found = [_respond(sc, m, p, spline, z) for p in range(len(m.parties))]
-    return tuple(replace(response, converged=response.converged and smooth) for response in found)
+    found = []
+    for p in range(len(m.parties)):
+        tight, loose = (_respond(sc, m, p, spline, z, rtol) for rtol in (_RTOL, 100.0 * _RTOL))
+        stable = _agree(tight.cost, loose.cost) and _agree(tight.best, loose.best)
+        found.append(replace(tight, converged=tight.converged and loose.converged and smooth and stable))
+    return tuple(found)
+
+
+def _agree(one: float, other: float) -> bool:
+    """Whether the tighter of two tolerances a hundredfold apart is within half a bound of the answer.
+
+    An expanding game can amplify rounding without bound: then it is not.
+    """
+    return one == other or abs(one - other) <= 50.0 * _REGRET * max(abs(one), abs(other))
 
 
 def _spline(sc: Scenario, feedback: Floats) -> Callable[[Any], Any]:
@@ -136,7 +148,7 @@ def _interpolation_error(sc: Scenario, feedback: Floats) -> float:
     return float(np.abs(coarse(skipped) - kept[1::2]).max() / max(np.abs(kept).max(), 1e-300)) / 64.0
 
 
-def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z: Floats) -> BestResponse:
+def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z: Floats, rtol: float) -> BestResponse:
     """Integrate Λ (the profile's cost) and Π (the best response's) of one party, backward from T."""
     own, size = m.members[p], m.size
     Bp = m.B[:, own]
@@ -169,7 +181,7 @@ def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z:
     start = np.concatenate([m.F[p].ravel(), m.F[p].ravel()])
     try:
         found = solve_ivp(
-            backward, (0.0, sc.horizon), start, method="DOP853", rtol=_RTOL, atol=_RTOL * scale, events=escaped
+            backward, (0.0, sc.horizon), start, method="DOP853", rtol=rtol, atol=rtol * scale, events=escaped
         )
     except TooStiffError:
         return BestResponse(m.parties[p], np.nan, np.nan, False)
