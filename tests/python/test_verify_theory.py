@@ -179,11 +179,11 @@ def test_the_indices_by_another_route(interaction, player):
         return np.r_[Bs @ u, 0.5 * (np.array(state) + own)]
 
     y = np.r_[adapted.start.ravel(), np.zeros(len(names))]
-    for k in range(adapted.steps):
+    for k in range(adapted.length):
         y = solve_ivp(rates, run.times[k : k + 2], y, args=(k,), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
     z = y[: 2 * game.N]
     for p, found in enumerate(index):
-        value = y[2 * game.N + p] + 0.5 * z @ fine[20 * adapted.steps][p] @ z
+        value = y[2 * game.N + p] + 0.5 * z @ fine[20 * adapted.length][p] @ z
         assert found.value == pytest.approx(value, abs=1e-8 * found.scale)
     moved = index[party]
     assert moved.converged
