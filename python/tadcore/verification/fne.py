@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BestResponse", "best_responses", "check_equilibrium", "riccati_defect"]
 
-_RTOL = 1e-11
+_RTOL = 1e-12
 _ESCAPED = 1e9
 _MOST_CALLS = 50_000
 _FEWEST = 800
@@ -56,12 +56,15 @@ class BestResponse:
         J of its best response; -inf where it can win without bound.
     converged : bool
         Whether the integration reached its tolerance and two tolerances agree.
+    scale : float
+        Sum of the absolute terms of the cost, which may cancel in it: what errors are relative to.
     """
 
     party: str
     cost: float
     best: float
     converged: bool
+    scale: float
 
     @property
     def regret(self) -> float:
@@ -118,17 +121,17 @@ def best_responses(sc: Scenario, feedback: Floats) -> tuple[BestResponse, ...]:
     found = []
     for p in range(len(m.parties)):
         tight, loose = (_respond(sc, m, p, spline, z, rtol) for rtol in (_RTOL, 100.0 * _RTOL))
-        stable = _agree(tight.cost, loose.cost) and _agree(tight.best, loose.best)
+        stable = _agree(tight.cost, loose.cost, tight.scale) and _agree(tight.best, loose.best, tight.scale)
         found.append(replace(tight, converged=tight.converged and loose.converged and smooth and stable))
     return tuple(found)
 
 
-def _agree(one: float, other: float) -> bool:
-    """Whether the tighter of two tolerances a hundredfold apart is within half a bound of the answer.
+def _agree(one: float, other: float, scale: float) -> bool:
+    """Whether the tighter of two tolerances a hundredfold apart is well within a bound of the answer.
 
     An expanding game can amplify rounding without bound: then it is not.
     """
-    return one == other or abs(one - other) <= 50.0 * _REGRET * max(abs(one), abs(other))
+    return one == other or abs(one - other) <= 3.0 * _REGRET * scale
 
 
 def _spline(sc: Scenario, feedback: Floats) -> Callable[[Any], Any]:
@@ -184,12 +187,13 @@ def _respond(sc: Scenario, m: Matrices, p: int, spline: Callable[[Any], Any], z:
             backward, (0.0, sc.horizon), start, method="DOP853", rtol=rtol, atol=rtol * scale, events=escaped
         )
     except TooStiffError:
-        return BestResponse(m.parties[p], np.nan, np.nan, False)
+        return BestResponse(m.parties[p], np.nan, np.nan, False, np.nan)
     kept, best = found.y[:, -1].reshape(2, size, size)
     cost = 0.5 * float(np.sum(z * (kept @ z)))
+    scale = 0.5 * float(np.sum(np.abs(z) * (np.abs(kept) @ np.abs(z))))
     if found.status == 1:
-        return BestResponse(m.parties[p], cost, -np.inf, True)
-    return BestResponse(m.parties[p], cost, 0.5 * float(np.sum(z * (best @ z))), bool(found.success))
+        return BestResponse(m.parties[p], cost, -np.inf, True, scale)
+    return BestResponse(m.parties[p], cost, 0.5 * float(np.sum(z * (best @ z))), bool(found.success), scale)
 
 
 def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None) -> VerificationReport:
@@ -233,7 +237,7 @@ def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None)
         fine = sc.replace(step=sc.horizon / (sc.steps * -(-_FEWEST // sc.steps)))
         rows = stacked_rows(solve_equilibrium(fine).feedback, sc.players)
     for found in best_responses(fine, rows):
-        relative = found.regret / max(abs(found.cost), abs(found.best), 1e-300) if found.regret else 0.0
+        relative = found.regret / max(found.scale, 1e-300) if found.regret else 0.0
         if not np.isfinite(found.best):
             relative = np.inf
         remedy = f"{found.party} gain by deviating: this feedback is no equilibrium of this game"
