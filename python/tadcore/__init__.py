@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ._core import __version__
     from .batch import Batch, simulate_batch
     from .equilibrium import Equilibrium, solve_equilibrium
-    from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
+    from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, VerificationError, WorkerError
     from .maps import OutcomeMap, outcome_map
     from .network import NetworkChange, VisibilityNetwork
     from .outcome import Outcome, OutcomeKind
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .study import Study
     from .sweeps import SweepResult, sweep
     from .synthesis import Gains, synthesize
+    from .verification import VerificationReport, verify
 
 __all__ = [
     "Attacker",
@@ -55,6 +56,8 @@ __all__ = [
     "SweepResult",
     "TadcoreError",
     "Target",
+    "VerificationError",
+    "VerificationReport",
     "VisibilityNetwork",
     "WorkerError",
     "__version__",
@@ -67,6 +70,7 @@ __all__ = [
     "solve_equilibrium",
     "sweep",
     "synthesize",
+    "verify",
 ]
 
 _HOMES = {
@@ -91,6 +95,8 @@ _HOMES = {
     "SweepResult": "sweeps",
     "TadcoreError": "errors",
     "Target": "scenario",
+    "VerificationError": "errors",
+    "VerificationReport": "verification",
     "VisibilityNetwork": "network",
     "WorkerError": "errors",
     "__version__": "_core",
@@ -102,6 +108,7 @@ _HOMES = {
     "solve_equilibrium": "equilibrium",
     "sweep": "sweeps",
     "synthesize": "synthesis",
+    "verify": "verification",
 }
 _ROOMS = frozenset(_HOMES.values()) | {
     "cli",

@@ -1,5 +1,5 @@
 # ruff: noqa: D301 (the help texts mark blocks that keep their lines with a backspace character)
-"""The command line: simulate a scenario, reproduce the paper, list and check scenarios.
+"""The command line: simulate a scenario, verify the theorems on it, reproduce the paper, list and check scenarios.
 
 Exit codes: 0 done; 1 the game has no equilibrium, or a check failed; 2 bad input.
 """
@@ -18,6 +18,7 @@ import typer
 from . import scenarios as bundled
 from ._cli_maps import draw_map, write_report
 from ._cli_study import study
+from ._cli_verify import register as _register_verify
 from ._terminal import complain, say
 from .errors import MISSING, ScenarioError, StoreError, TadcoreError
 
@@ -202,6 +203,9 @@ def load_scenario(source: str) -> Scenario:
         if not error.field.startswith(source):
             error.add_note(f"(in {source})")
         raise
+
+
+_register_verify(app, _load)
 
 
 def _usable(out: Path | None) -> None:

@@ -13,7 +13,16 @@ import reprlib
 from collections.abc import Iterable
 from decimal import Decimal
 
-__all__ = ["MISSING", "Missing", "NoEquilibriumError", "ScenarioError", "StoreError", "TadcoreError", "WorkerError"]
+__all__ = [
+    "MISSING",
+    "Missing",
+    "NoEquilibriumError",
+    "ScenarioError",
+    "StoreError",
+    "TadcoreError",
+    "VerificationError",
+    "WorkerError",
+]
 
 
 class Missing(enum.Enum):
@@ -191,6 +200,38 @@ class WorkerError(TadcoreError, RuntimeError):
             else "they are lost: with store=… a study keeps them and goes on from there when it is run again"
         )
         return f"a worker died ({self.reason}) when {self.done} of {self.chunks} chunks were finished; {kept}"
+
+
+UNDECIDED = "the measurement is not accurate enough to decide: a smaller step or a shorter horizon may help"
+"""The remedy of a check whose numerics have not converged."""
+
+
+class VerificationError(TadcoreError, AssertionError):
+    """A check of `tadcore.verify` that did not pass.
+
+    Parameters
+    ----------
+    check : str
+        Name of the check, such as ``"fne.regret.target"``.
+    value, bound : float
+        What was measured, and the most that is accepted.
+    remedy : str
+        What to do about it.
+    converged : bool
+        Whether the numbers behind the check can be relied on; False says that the check is undecided.
+    """
+
+    def __init__(self, check: str, value: float, bound: float, remedy: str, converged: bool = True) -> None:
+        super().__init__(check, value, bound, remedy, converged)
+        self.check = check
+        self.value = value
+        self.bound = bound
+        self.remedy = remedy
+        self.converged = converged
+
+    def __str__(self) -> str:
+        state, advice = ("not accepted", self.remedy) if self.converged else ("not converged", UNDECIDED)
+        return f"{self.check}: {state}, measured {self.value:.3g} where at most {self.bound:.3g} passes; {advice}"
 
 
 def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:

@@ -126,7 +126,9 @@ class StudyResult:
         """
         return simulate(self.setup(trial))
 
-    def probabilities(self, *, level: float = 0.95, method: Literal["wilson", "exact"] = "wilson") -> OutcomeProbabilities:
+    def probabilities(
+        self, *, level: float = 0.95, method: Literal["wilson", "exact"] = "wilson"
+    ) -> OutcomeProbabilities:
         """How often each outcome came, with intervals: see `tadcore.statistics.probabilities`.
 
         Parameters

@@ -10,6 +10,7 @@ pytest.importorskip("tadcore._core")
 ROOMS = ["", ".scenario", ".scenarios", ".equilibrium", ".network", ".synthesis", ".simulation", ".batch"]
 ROOMS += [".sampling", ".study", ".sweeps"]
 ROOMS += [".maps", ".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
+ROOMS += [".verification", ".verification.events"]
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -4,6 +4,7 @@ Every function draws in the axes it is given, or in new ones, and returns them; 
 read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
 """
 
+from ._externality import externality
 from ._labels import Labels
 from ._network import network
 from ._save import save
@@ -23,6 +24,7 @@ __all__ = [
     "comparison",
     "controls",
     "distances",
+    "externality",
     "incidence",
     "network",
     "outcome_map",

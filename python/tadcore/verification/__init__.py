@@ -1,0 +1,155 @@
+"""The paper's theorems as things to run: whether it is Nash, for which indices, and whether a minimum is one.
+
+`verify` runs every check on a scenario or on a run and returns a `VerificationReport`. The pieces can be called alone:
+
+==========================  =====================================================================================
+room                        what it answers
+==========================  =====================================================================================
+``fne``                     does P solve its Riccati equation, and does anyone gain by deviating (thm:fbne,
+                            thm:zero:sum:game)
+``adapted``, ``nafne``      S, ΔQ^Ad, the indices J^Ad in continuous time and their identities (thm:thm1, thm:thm2)
+``record``                  is the record what the equations say
+``consistency``             full sight gives the equilibrium (thm:consistency); how far the indices are from the own
+``gains``, ``objective``    gradient, curvature in full blocks, other starts, how often certificates hold
+``geometry``                straight line (thm:straight_line), radius delay (thm:delayproperty), symmetries
+``steps``, ``events``       δ, δ/2, δ/4; chattering; the continuous game by its event times, sliding modes included
+``externality``             the jump of every player's control at every change of the network
+``decentral``               the synthesis as a protocol between players (rem:networkexternality)
+==========================  =====================================================================================
+
+Everything here is computed by NumPy and SciPy from the scenario's weights and the record.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tadcore.equilibrium import solve_equilibrium
+from tadcore.errors import ScenarioError, VerificationError
+from tadcore.simulation import Run, simulate
+
+from .adapted import Adapted, Deviation, Index
+from .consistency import check_consistency, index_distance
+from .decentral import Decentralised, check_decentral, decentralise
+from .events import Event, EventPlay, play_by_events
+from .externality import control_jumps
+from .fne import BestResponse, best_responses, check_equilibrium, riccati_defect
+from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
+from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
+from .indices import AdaptedWeights, adapted_weights
+from .nafne import check_nafne, gap_order, sampling_gap
+from .record import check_record
+from .report import Check, Measurement, VerificationReport, combine
+from .steps import Chatter, Refinement, StepStudy, chatter, check_steps, refine_batch, step_study
+
+if TYPE_CHECKING:
+    from tadcore.scenario import Scenario
+
+__all__ = [
+    "Adapted",
+    "AdaptedWeights",
+    "BestResponse",
+    "CertificateRates",
+    "Chatter",
+    "Check",
+    "Decentralised",
+    "Deviation",
+    "Event",
+    "EventPlay",
+    "Index",
+    "Measurement",
+    "Refinement",
+    "StepStudy",
+    "VerificationError",
+    "VerificationReport",
+    "adapted_weights",
+    "best_responses",
+    "certificate_rates",
+    "chatter",
+    "check_consistency",
+    "check_decentral",
+    "check_equilibrium",
+    "check_gains",
+    "check_geometry",
+    "check_nafne",
+    "check_record",
+    "check_steps",
+    "control_jumps",
+    "decentralise",
+    "gap_order",
+    "index_distance",
+    "lowest_curvature",
+    "moved",
+    "multistart",
+    "off_the_line",
+    "play_by_events",
+    "radius_delay",
+    "refine_batch",
+    "relabelled",
+    "riccati_defect",
+    "sampling_gap",
+    "step_study",
+    "verify",
+]
+
+
+def verify(
+    sc_or_run: Scenario | Run, *, deviations: int = 2, instants: int = 20, starts: int = 0, seed: int = 0
+) -> VerificationReport:
+    """Check the paper's theorems on a scenario or on a run.
+
+    Parameters
+    ----------
+    sc_or_run : Scenario or Run
+        A scenario, which is played first, or a run, which is checked as recorded.
+    deviations : int
+        Random admissible deviations of each player.
+    instants : int
+        At how many instants the Hessian of Θ is formed in full blocks.
+    starts : int
+        Random starts at each of those instants; none by default, since they take seconds.
+    seed : int
+        Key of the deviations and the starts.
+
+    Returns
+    -------
+    VerificationReport
+        Every check with its measured value, its bound and, where it fails, a remedy; ``require_ok()`` raises.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+    ScenarioError
+        The argument is neither a scenario nor a run.
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> report = tadcore.verify(tadcore.scenarios.load("paper-i1"))
+    >>> report.ok
+    True
+    >>> report["nafne.value.defenders"].accepted
+    True
+    """
+    from tadcore.scenario import Scenario
+
+    if not isinstance(sc_or_run, Scenario | Run):
+        raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")
+    run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run
+    equilibrium = solve_equilibrium(run.scenario)
+    title = f"{run.scenario.interaction}: {run.outcome}"
+    parts = [check_equilibrium(run.scenario)]
+    if len(run.times) < 2:
+        note = "the game is over at t = 0: there is no play to check"
+        return combine(title, [*parts, VerificationReport("run", (), notes=(note,))])
+    parts += [
+        check_record(run, equilibrium),
+        check_nafne(run, equilibrium, deviations=deviations, seed=seed),
+        check_consistency(run, equilibrium),
+        check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed),
+        check_geometry(run, seed=seed),
+        check_decentral(run),
+        check_steps(run),
+    ]
+    return combine(title, parts)
