@@ -27,8 +27,24 @@ class Plots:
         """Controls along one axis, with dashed verticals at network changes."""
         return self._draw("controls", arguments, options)
 
+    def distances(self, *arguments: Any, **options: Any) -> Any:
+        """Distances to the attacker, with capture and visibility radii."""
+        return self._draw("distances", arguments, options)
+
+    def visibility(self, *arguments: Any, **options: Any) -> Any:
+        """A raster of who sees whom, edge by time."""
+        return self._draw("visibility", arguments, options)
+
+    def gains(self, *arguments: Any, **options: Any) -> Any:
+        """The rows of the feedback over time, one panel for each player with limited sight."""
+        return self._draw("gains", arguments, options)
+
+    def theta(self, *arguments: Any, **options: Any) -> Any:
+        """The synthesis objective and the terms that make it up."""
+        return self._draw("theta", arguments, options)
+
     def _draw(self, name: str, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
         return getattr(import_module("tadcore.plotting"), name)(self._run, *arguments, **options)
 
     def __repr__(self) -> str:
-        return "trajectories(), network(), controls()"
+        return ", ".join(f"{name}()" for name in vars(type(self)) if not name.startswith("_"))

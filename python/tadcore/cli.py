@@ -231,7 +231,7 @@ def _draw(run: Any, out: Path | None) -> None:
     with plotting.style():
         drawn = {"trajectories": run.plot.trajectories(), "network": run.plot.network()}
         drawn |= {f"control-{axis}": run.plot.controls(axis=axis) for axis in "xyz"[: run.scenario.dim]}
-        drawn |= {"distances": plotting.distances(run), "theta": plotting.theta(run)}
+        drawn |= {name: getattr(run.plot, name)() for name in ("distances", "visibility", "gains", "theta")}
         figures = {name: (axes if hasattr(axes, "figure") else axes.flat[0]).figure for name, axes in drawn.items()}
         if out is None:
             plt.show()

@@ -4,8 +4,11 @@ Every function draws in the axes it is given, or in new ones, and returns them; 
 read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
 """
 
+from ._compare import compare
+from ._gains import gains
 from ._labels import Labels
 from ._network import network
+from ._raster import MAX_ROWS, visibility
 from ._save import save
 from ._series import MAX_VERTICALS, controls, distances, theta
 from ._style import COLUMN, PAGE, style
@@ -14,14 +17,18 @@ from ._trajectories import MAX_EDGE_LABELS, trajectories
 __all__ = [
     "COLUMN",
     "MAX_EDGE_LABELS",
+    "MAX_ROWS",
     "MAX_VERTICALS",
     "PAGE",
     "Labels",
+    "compare",
     "controls",
     "distances",
+    "gains",
     "network",
     "save",
     "style",
     "theta",
     "trajectories",
+    "visibility",
 ]
