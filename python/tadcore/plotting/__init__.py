@@ -4,6 +4,7 @@ Every function draws in the axes it is given, or in new ones, and returns them; 
 read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
 """
 
+from ._animation import Animation
 from ._compare import compare
 from ._gains import gains
 from ._labels import Labels
@@ -20,6 +21,7 @@ __all__ = [
     "MAX_ROWS",
     "MAX_VERTICALS",
     "PAGE",
+    "Animation",
     "Labels",
     "compare",
     "controls",

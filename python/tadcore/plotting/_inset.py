@@ -39,7 +39,7 @@ def magnify(
     Returns the axes of the inset, or None where nothing is free or the region is too large to gain from it.
     """
     width, height = _inches(ax)
-    low, high = _filled(low, high, width / height)
+    low, high = filled(low, high, width / height)
     spread = np.ptp(crowded, axis=0) + 2 * pad
     extent = float(max(spread[0], spread[1] * width / height)) * 1.1
     part = extent / float(high[0] - low[0])  # of the axes' width, and of their height too
@@ -84,7 +84,7 @@ def _inches(ax: Axes) -> tuple[float, float]:
     return box.width / dpi, box.height / dpi
 
 
-def _filled(low: Floats, high: Floats, ratio: float) -> tuple[Floats, Floats]:
+def filled(low: Floats, high: Floats, ratio: float) -> tuple[Floats, Floats]:
     """Widen the box about its centre to the ratio of the axes, as an equal aspect will."""
     size, centre = high - low, (low + high) / 2
     size = np.array([max(size[0], size[1] * ratio), max(size[1], size[0] / ratio)])
