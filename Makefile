@@ -58,8 +58,12 @@ peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
-docs:  ## the core's API documentation, warnings are errors
+docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; warnings are errors
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python docs/check_links.py docs/_build/html
+	@echo "open docs/_build/html/index.html"
 
 check: lint test  ## everything that must pass before a change lands
 
