@@ -1,5 +1,6 @@
 """Figures of the network and the gains, two runs overlaid, the magnified end, and what a file holds."""
 
+import inspect
 import shutil
 import subprocess
 
@@ -39,6 +40,11 @@ def test_every_figure_is_a_method_of_the_run(runs):
     plots = runs["paper-i2"].plot
     assert all(f"{name}()" in repr(plots) for name in names)
     for name in names:
+        method, function = (inspect.signature(getattr(home, name)) for home in (plots, plotting))
+        given = list(function.parameters.values())[1:]
+        assert [(p.name, p.kind, p.default) for p in method.parameters.values()] == [
+            (p.name, p.kind, p.default) for p in given
+        ]
         axes = getattr(plots, name)()
         assert np.asarray(axes, dtype=object).ravel()[0].figure is not None
     plt.close("all")
