@@ -72,7 +72,7 @@ _HOMES = {
     "solve_equilibrium": "equilibrium",
     "synthesize": "synthesis",
 }
-_ROOMS = frozenset(_HOMES.values()) | {"cli", "plotting", "reproduce", "scenarios"}
+_ROOMS = frozenset(_HOMES.values()) | {"cli", "explorer", "plotting", "reproduce", "scenarios"}
 
 
 def __getattr__(name: str) -> Any:

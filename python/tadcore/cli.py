@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import scenarios as bundled
+from ._cli_explore import add_explore
 from ._terminal import complain, say
 from .errors import MISSING, ScenarioError, TadcoreError
 
@@ -154,6 +155,9 @@ def validate(
     say(f"{file}: valid")
     for line in sc.describe().splitlines():
         say(line, indent=2)
+
+
+add_explore(app, lambda source: _load(source))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -60,5 +60,5 @@ def test_mypy_strict_passes_and_finds_mistakes(tmp_path):
 
 @pytest.mark.skipif(importlib.util.find_spec("pyright") is None, reason="pyright is not installed")
 def test_pyright_passes():
-    code, said = checked("pyright", SCRIPT)
+    code, said = checked("pyright", "--pythonpath", sys.executable, SCRIPT)
     assert code == 0, said
