@@ -29,9 +29,8 @@ def arena(sources: Sources) -> Any:
     half = (0.5 + _ROOM) * max(float((high - low).max()), 0.5)
     x, y = (low + high) / 2
     plot = figure(
-        width=600, height=560, match_aspect=True, tools="wheel_zoom,reset,save", active_scroll=None,
-        x_range=Range1d(x - half, x + half), y_range=Range1d(y - half * 500 / 560, y + half * 500 / 560),
-        x_axis_label="x", y_axis_label="y",
+        name="arena", frame_width=520, frame_height=520, tools="wheel_zoom,reset,save", active_scroll=None,
+        x_range=Range1d(x - half, x + half), y_range=Range1d(y - half, y + half), x_axis_label="x", y_axis_label="y",
     )  # fmt: skip
     players = list(paths["player"])
     colour = factor_cmap("player", [look(p).colour for p in players], players)
@@ -46,6 +45,7 @@ def arena(sources: Sources) -> Any:
                           line_color=colour, line_width=2.5)  # fmt: skip
     handles = plot.scatter("x", "y", source=sources["handles"], marker="diamond", size=13, color=colour,
                            line_color="white")  # fmt: skip
+    plot.text("x", "y", text="name", source=sources["starts"], x_offset=11, y_offset=-7, text_color=colour)
     tool = PointDrawTool(renderers=[starts, handles], add=False, drag=True)
     plot.add_tools(tool)
     plot.toolbar.active_tap = None
@@ -53,30 +53,30 @@ def arena(sources: Sources) -> Any:
     return plot
 
 
-def timeline(sources: Sources, sc: Scenario) -> Any:
+def timeline(sources: Sources, sc: Scenario, now: Span) -> Any:
     """Who sees whom, when: edge × time."""
     from ._page import edge_name
 
     rows = [edge_name(p, q) for p in sc.constrained for q in sc.players if q != p]
     observers = list(sc.constrained)
-    plot = _history("network", height=70 + 13 * len(rows), y_range=rows[::-1])
+    plot = _history("network", now, height=70 + 13 * len(rows), y_range=rows[::-1])
     colour = factor_cmap("observer", [look(p).colour for p in observers], observers)
     plot.hbar(y="edge", left="left", right="right", height=0.7, source=sources["bars"], color=colour, line_color=None)
     plot.ygrid.grid_line_color = None
     return plot
 
 
-def theta(sources: Sources) -> Any:
+def theta(sources: Sources, now: Span) -> Any:
     """The synthesis objective over time."""
-    plot = _history("Θ", height=150)
+    plot = _history("Θ", now, height=150)
     plot.line("t", "theta", source=sources["theta"], color="black", line_width=2)
     plot.y_range.start = 0
     return plot
 
 
-def controls(sources: Sources, sc: Scenario) -> Any:
+def controls(sources: Sources, sc: Scenario, now: Span) -> Any:
     """The speed of every player over time."""
-    plot = _history("speed |u|", height=190)
+    plot = _history("speed |u|", now, height=190)
     for player in sc.players:
         plot.line("t", player, source=sources["controls"], color=look(player).colour, line_width=2)
     plot.y_range.start = 0
@@ -84,8 +84,13 @@ def controls(sources: Sources, sc: Scenario) -> Any:
     return plot
 
 
-def _history(title: str, **options: Any) -> Any:
+def instant() -> Span:
+    """A mark at the instant shown, for one history."""
+    return Span(location=0.0, dimension="height", line_color="black", line_dash="dashed")
+
+
+def _history(title: str, now: Span, **options: Any) -> Any:
     plot = figure(width=430, title=title, tools="", toolbar_location=None, **options)
     plot.x_range.update(start=0, range_padding=0)
-    plot.add_layout(Span(name="now", location=0.0, dimension="height", line_color="black", line_dash="dashed"))
+    plot.add_layout(now)
     return plot

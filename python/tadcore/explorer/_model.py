@@ -77,7 +77,7 @@ class Explorer:
     @property
     def positions(self) -> Floats:
         """Where everyone stands at the instant that is shown, shape (n + 2, 2)."""
-        return self.run.position[self.k]
+        return np.asarray(self.run.position[self.k])
 
     @property
     def sampled(self) -> NDArray[np.intp]:

@@ -13,9 +13,10 @@ from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Slider, Toggle
 
 from tadcore.errors import TadcoreError
+from tadcore.plotting._raster import bars_of
 from tadcore.plotting._style import symbol
 
-from ._figures import arena, controls, theta, timeline
+from ._figures import arena, controls, instant, theta, timeline
 
 if TYPE_CHECKING:
     from bokeh.document import Document
@@ -43,16 +44,18 @@ class Page:
         self.sources = {name: ColumnDataSource() for name in names}
         self.download = ColumnDataSource(data={"name": [], "href": []})
         self.download.js_on_change("data", CustomJS(args={"source": self.download}, code=_DOWNLOAD))
-        self.status = Div(styles={"font-size": "1.2em"}, min_height=28)
-        self.time = Slider(start=0.0, end=1.0, value=0.0, step=explorer.scenario.step, title="time t", width=560)
+        self.status = Div(name="status", styles={"font-size": "1.2em"}, min_height=28)
+        step = explorer.scenario.step
+        self.time = Slider(start=0.0, end=1.0, value=0.0, step=step, title="time t", format="0.000", width=560)
         self._grabbed: tuple[str, str] | None = None
         self._quiet = False
         self.play()
         self.arena = arena(self.sources)
+        self.marks = [instant() for _ in range(3)]
         self.plots = [
-            timeline(self.sources, explorer.scenario),
-            theta(self.sources),
-            controls(self.sources, explorer.scenario),
+            timeline(self.sources, explorer.scenario, self.marks[0]),
+            theta(self.sources, self.marks[1]),
+            controls(self.sources, explorer.scenario, self.marks[2]),
         ]
         self._sliders = self._make_sliders()
         self._listen()
@@ -93,15 +96,16 @@ class Page:
         }
         if self._grabbed is None or self._grabbed[0] != "starts":  # the browser moves what it drags
             x, y = explorer.scenario.positions.T.tolist()
-            self.sources["starts"].data = {"player": list(players), "x": x, "y": y}
-        bars: dict[str, list[Any]] = {"edge": [], "left": [], "right": [], "observer": []}
-        for interval in run.intervals():
-            for observer, seen in interval.edges:
-                bars["edge"].append(edge_name(observer, seen))
-                bars["left"].append(interval.start)
-                bars["right"].append(interval.end)
-                bars["observer"].append(observer)
-        self.sources["bars"].data = bars
+            self.sources["starts"].data = {
+                "player": list(players), "x": x, "y": y, "name": [plain(p) for p in players]
+            }  # fmt: skip
+        bars = [(edge, bar) for edge, there in bars_of(run).items() for bar in there]
+        self.sources["bars"].data = {
+            "edge": [edge_name(*edge) for edge, _ in bars],
+            "observer": [edge[0] for edge, _ in bars],
+            "left": [bar[0] for _, bar in bars],
+            "right": [bar[1] for _, bar in bars],
+        }
         self.sources["theta"].data = {"t": times, "theta": run.theta[at].tolist()}
         effort = {p: np.linalg.norm(run.control[at, i], axis=1).tolist() for i, p in enumerate(players)}
         self.sources["controls"].data = {"t": times, **effort}
@@ -124,10 +128,11 @@ class Page:
             holders, [where[players.index(p)].tolist() for p in holders], sc.capture_radii.tolist()
         )
         if self._grabbed is None or self._grabbed[0] != "handles":
-            rims = [(x + r * math.cos(0.6 + i), y + r * math.sin(0.6 + i)) for i, ((x, y), (_, r)) in
-                    enumerate(zip(centres, sight, strict=True))]  # fmt: skip
+            around = enumerate(zip(sight, centres, strict=True))
+            rims = [(p, self._rim(i, (x, y), r)) for i, ((p, r), (x, y)) in around]
+            seen = [(p, at) for p, at in rims if at is not None]
             self.sources["handles"].data = {
-                "player": [p for p, _ in sight], "x": [x for x, _ in rims], "y": [y for _, y in rims]
+                "player": [p for p, _ in seen], "x": [at[0] for _, at in seen], "y": [at[1] for _, at in seen]
             }  # fmt: skip
         lines = [(where[players.index(p)], where[players.index(q)], p) for p, q in explorer.edges]
         self.sources["sight"].data = {
@@ -135,8 +140,8 @@ class Page:
             "x1": [float(b[0]) for _, b, _ in lines], "y1": [float(b[1]) for _, b, _ in lines],
             "player": [p for _, _, p in lines],
         }  # fmt: skip
-        for plot in self.plots:
-            plot.select_one("now").location = float(explorer.run.times[explorer.k])
+        for mark in self.marks:
+            mark.location = float(explorer.run.times[explorer.k])
 
     def grab(self, x: float, y: float) -> None:
         """A drag begins: remember what lies under the pointer."""
@@ -232,9 +237,18 @@ class Page:
             self.change(lambda: self.explorer.capture(player, radius))
 
     def _button(self, label: str, action: Callable[[], None]) -> Button:
-        button = Button(label=label, width=160)
+        button = Button(label=label, width=160, tags=[self.download])  # so that the source is part of the document
         button.on_click(lambda event: action())
         return button
+
+    def _rim(self, i: int, centre: tuple[float, float], radius: float) -> tuple[float, float] | None:
+        """Return a point of a disc's rim within the picture, None if there is none; ``i`` turns the direction."""
+        across, up = self.arena.x_range, self.arena.y_range
+        for angle in 0.6 + i + np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False):
+            at = centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)
+            if across.start < at[0] < across.end and up.start < at[1] < up.end:
+                return at
+        return None
 
     def _span(self) -> tuple[float, float]:
         x, y = self.arena.x_range, self.arena.y_range
@@ -243,10 +257,11 @@ class Page:
 
 def edge_name(observer: str, seen: str) -> str:
     """Return the label of an edge in the timeline."""
-    return f"{_plain(observer)} → {_plain(seen)}"
+    return f"{plain(observer)} → {plain(seen)}"
 
 
-def _plain(player: str) -> str:
+def plain(player: str) -> str:
+    """Return the symbol of a player without mathematics: d1, τ, a."""
     return symbol(player).replace(r"\tau", "τ").translate(str.maketrans("", "", "_{}"))
 
 

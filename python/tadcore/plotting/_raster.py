@@ -44,15 +44,9 @@ def visibility(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axe
     """
     rows = _rows(run)
     ax = new_axes(ax, COLUMN, max(0.75 + _ROW * max(len(rows), 3) / 72.0, 1.3))
-    spans: dict[Edge, list[tuple[float, float]]] = {edge: [] for edge in rows}
-    for start, end, edges in run.intervals():
-        for edge in edges:
-            there = spans[edge]
-            if there and there[-1][1] == start:
-                there[-1] = (there[-1][0], end)
-            else:
-                there.append((start, end))
-    for row, (edge, bars) in enumerate(spans.items()):
+    spans = bars_of(run)
+    for row, edge in enumerate(rows):
+        bars = spans.get(edge, [])
         colour = look(edge[0]).colour
         ax.broken_barh([(a, b - a) for a, b in bars], (row - 0.36, 0.72), color=colour, linewidth=0, zorder=2.0)
         ax.axhline(row, color=colour, linewidth=0.4, alpha=0.5, zorder=1.0)
@@ -73,6 +67,19 @@ def visibility(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axe
     if absent:
         note(ax, f"{absent} edges never form and are left out")
     return ax
+
+
+def bars_of(run: Run) -> dict[Edge, list[tuple[float, float]]]:
+    """Return, for each edge that ever forms, the stretches of time over which it is there."""
+    spans: dict[Edge, list[tuple[float, float]]] = {}
+    for start, end, edges in run.intervals():
+        for edge in edges:
+            there = spans.setdefault(edge, [])
+            if there and there[-1][1] == start:
+                there[-1] = (there[-1][0], end)
+            else:
+                there.append((start, end))
+    return spans
 
 
 def _rows(run: Run) -> list[Edge]:
