@@ -50,6 +50,20 @@ def test_every_figure_is_a_method_of_the_run(runs):
     plt.close("all")
 
 
+def test_a_game_over_at_once_still_has_figures():
+    import matplotlib.pyplot as plt
+
+    run = tadcore.simulate(tadcore.scenarios.load("paper-i1").replace({"attacker.position": (0.05, 0.0)}))
+    assert run.outcome.time == 0
+    for name in ("trajectories", "network", "controls", "distances", "visibility", "gains", "theta"):
+        panels = np.asarray(getattr(run.plot, name)(), dtype=object).ravel()
+        panels[0].figure.canvas.draw()
+    (panel,) = run.plot.network().ravel()
+    assert [text.get_text() for text in panel.texts] == ["over at $t=0$"]
+    assert len(run.animate(seconds=0.5, fps=4).figure().axes) == 2
+    plt.close("all")
+
+
 @pytest.mark.parametrize("name", ["paper-i1", "paper-i2-wide"])
 def test_bars_last_as_long_as_their_edge(runs, name):
     run = runs[name]
@@ -117,7 +131,10 @@ def test_full_observation_is_dashed_whichever_comes_first(runs, what):
 def test_runs_that_see_alike_are_named_by_their_ends(runs):
     ax = plotting.compare(runs["paper-i2"], runs["paper-i2-far"], ax=sheet().add_subplot())
     names = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert names == [str(runs["paper-i2"].outcome), str(runs["paper-i2-far"].outcome)]
+    assert names == ["$d_{1}$ intercepts $a$ at $t=3.54$", r"$a$ captures $\tau$ at $t=3.925$"]
+    legend, page = ax.get_legend(), ax.figure.bbox
+    ax.figure.canvas.draw()
+    assert page.x0 <= legend.get_window_extent().x0 < legend.get_window_extent().x1 <= page.x1
     ax = plotting.compare(runs["paper-i2"], runs["paper-i2-far"], names=("near", "far"), ax=sheet().add_subplot())
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["near", "far"]
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore.errors import ScenarioError
+from tadcore.network import edges_of
 from tadcore.simulation import Run, simulate
 
 if TYPE_CHECKING:
@@ -92,10 +93,9 @@ class Explorer:
     @property
     def edges(self) -> tuple[Edge, ...]:
         """Who sees whom at the instant that is shown."""
-        for interval in reversed(self.run.intervals()):
-            if interval.start <= self.run.times[self.k]:
-                return interval.edges
-        return ()
+        if len(self.run.times) == 1:  # over before anyone looks around
+            return ()
+        return edges_of(self.run.adjacency[self.k], self.scenario.players)
 
     def toml(self) -> str:
         """The scenario as TOML."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from ._ends import label_ends
-from ._paths import LAID_UNDER
+from ._paths import LAID_UNDER, name_runs
 from ._series import span
-from ._style import COLUMN, look, new_axes
+from ._style import COLUMN, look, new_axes, outcome_text
 from ._trajectories import trajectories
 
 if TYPE_CHECKING:
@@ -84,9 +83,7 @@ def compare(
     if what == "distances":
         ax.set_ylim(bottom=0.0)
     label_ends(ax, ends)
-    styles: Any = (("-", names[0]), (LAID_UNDER, names[1]))
-    handles = [Line2D([], [], color="0.2", linestyle=dash, label=name) for dash, name in styles]
-    ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, borderaxespad=0.2)
+    name_runs(ax, names)
     return ax
 
 
@@ -96,4 +93,4 @@ def _full(run: Run) -> bool:
 
 def _names(run_a: Run, run_b: Run) -> tuple[str, str]:
     a, b = ("full observation" if _full(run) else "limited observations" for run in (run_a, run_b))
-    return (a, b) if a != b else (str(run_a.outcome), str(run_b.outcome))
+    return (a, b) if a != b else (outcome_text(run_a), outcome_text(run_b))

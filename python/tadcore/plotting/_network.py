@@ -71,7 +71,7 @@ def network(
     """
     changes = list(run.network_changes)
     if axes is None:
-        axes = _new_axes(min(len(changes), max_panels), columns)
+        axes = _new_axes(max(min(len(changes), max_panels), 1), columns)
     panels = list(np.asarray(axes, dtype=object).ravel())
     shown = min(len(changes), max_panels, len(panels))
     end = float(run.outcome.time)
@@ -88,6 +88,8 @@ def network(
             title.set_fontsize(min(title.get_fontsize(), _SMALL))
     for panel in panels[shown:]:
         panel.set_axis_off()
+    if not changes:
+        panels[0].text(0.5, 0.5, "over at $t=0$", transform=panels[0].transAxes, ha="center", va="center")
     if shown and shown < len(changes):
         note(panels[shown - 1], f"and {len(changes) - shown} more")
     return axes

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ Floats = NDArray[np.float64]
 
 LAID_UNDER: Any = (0, (4, 2))
 """Dashes of a run laid under another."""
+_ONE_LINE = 42  # letters of two names that fit side by side above one column
 _AT_START = 0.015  # of the diagonal; a mark nearer than this would hide the marker of the start
 _SIZES = {"*": 7.5, "X": 5.8}
 
@@ -66,6 +68,22 @@ def paths(ax: Axes, run: Run, *, dashed: bool, marks: Floats | None = None) -> N
             **common,
         )
         _heading(ax, path, it.colour)
+
+
+def name_runs(ax: Axes, names: tuple[str, str]) -> None:
+    """Say above the axes which run is solid and which is dashed, below one another where the names are long."""
+    handles = [
+        Line2D([], [], color="0.2", linestyle="-", label=names[0]),
+        Line2D([], [], color="0.2", linestyle=LAID_UNDER, label=names[1]),
+    ]
+    ax.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=2 if sum(map(len, names)) <= _ONE_LINE else 1,
+        frameon=False,
+        borderaxespad=0.2,
+    )
 
 
 def _heading(ax: Axes, path: Floats, colour: str) -> None:

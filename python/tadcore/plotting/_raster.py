@@ -71,14 +71,15 @@ def visibility(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axe
 
 def bars_of(run: Run) -> dict[Edge, list[tuple[float, float]]]:
     """Return, for each edge that ever forms, the stretches of time over which it is there."""
+    players, attacker = run.scenario.players, run.scenario.n + 1
+    in_force = run.adjacency[:-1].astype(np.int8)
+    starts = np.diff(in_force, axis=0, prepend=0) > 0
+    ends = np.diff(in_force, axis=0, append=0) < 0
     spans: dict[Edge, list[tuple[float, float]]] = {}
-    for start, end, edges in run.intervals():
-        for edge in edges:
-            there = spans.setdefault(edge, [])
-            if there and there[-1][1] == start:
-                there[-1] = (there[-1][0], end)
-            else:
-                there.append((start, end))
+    for i, j in np.argwhere(starts.any(axis=0)).tolist():
+        first, last = np.flatnonzero(starts[:, i, j]), np.flatnonzero(ends[:, i, j]) + 1
+        edge = players[i], players[attacker if i == j else j]
+        spans[edge] = list(zip(run.times[first].tolist(), run.times[last].tolist(), strict=True))
     return spans
 
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ._inset import crowd, magnify
 from ._labels import Labels
-from ._paths import LAID_UNDER, disc, paths, positions
+from ._paths import disc, name_runs, paths, positions
 from ._style import COLUMN, edge_text, look, new_axes, note, outcome_text, players
 
 if TYPE_CHECKING:
@@ -108,18 +107,7 @@ def trajectories(
     if inset is not None:
         _ends(inset, run)
     if full is not None:
-        handles = [
-            Line2D([], [], color="0.2", linestyle="-", label=names[0]),
-            Line2D([], [], color="0.2", linestyle=LAID_UNDER, label=names[1]),
-        ]
-        ax.legend(
-            handles=handles,
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            ncols=2,
-            frameon=False,
-            borderaxespad=0.2,
-        )
+        name_runs(ax, names)
     elif title:
         ax.set_title(outcome_text(run))
     return ax
