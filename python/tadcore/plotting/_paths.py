@@ -83,6 +83,9 @@ def name_runs(ax: Axes, names: tuple[str, str]) -> None:
         ncols=2 if sum(map(len, names)) <= _ONE_LINE else 1,
         frameon=False,
         borderaxespad=0.2,
+        fontsize="small",
+        columnspacing=1.0,
+        handlelength=1.8,
     )
 
 
