@@ -14,6 +14,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "numpydoc",
     "sphinx_design",
+    "sphinx-mathjax-offline",
 ]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "jupyter_execute"]
@@ -35,6 +36,7 @@ autodoc_typehints = "none"  # the numpydoc sections say the types, with shapes
 numpydoc_show_class_members = False
 add_module_names = False
 
+html_sidebars = {page: [] for page in ("install", "theory", "errors")}  # nothing below them to list
 html_theme = "pydata_sphinx_theme"
 html_title = f"tadcore {release}"
 html_static_path = ["_static"]

@@ -71,7 +71,7 @@ def test_extras_bring_what_their_part_imports():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     names = {extra: {re.split(r"[<>=]", need)[0] for need in needs} for extra, needs in extras.items()}
     used = re.findall(
-        r'^    "(\w+)",$|"(sphinx_design)"', (ROOT / "docs" / "conf.py").read_text(encoding="utf-8"), flags=re.M
+        r'^    "([\w-]+)",$|"(sphinx_design)"', (ROOT / "docs" / "conf.py").read_text(encoding="utf-8"), flags=re.M
     )
     for module in {first or second for first, second in used} - {"sphinx"}:
         assert module.replace("_", "-") in names["docs"], module
