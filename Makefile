@@ -10,7 +10,7 @@ STAMP  := $(VENV)/.installed
 RUST   := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format bench peers docs check clean
+.PHONY: help setup demo test test-rust test-python lint format bench peers docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -58,10 +58,22 @@ peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
-docs:  ## the core's API documentation, warnings are errors
+docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; warnings are errors
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python docs/check_links.py docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+wheel: $(STAMP)  ## one wheel for every Python from 3.11 on, into dist/
+	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2'
+	$(BIN)/maturin build --release --locked --strip --out dist
+
+sdist: $(STAMP)  ## the sources as one archive, into dist/
+	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2'
+	$(BIN)/maturin sdist --out dist
 
 check: lint test  ## everything that must pass before a change lands
 
 clean:  ## remove what the other targets made
-	rm -rf $(VENV) $(OUT) target dist build
+	rm -rf $(VENV) $(OUT) target dist build docs/_build

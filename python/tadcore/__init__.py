@@ -112,6 +112,7 @@ _HOMES = {
 }
 _ROOMS = frozenset(_HOMES.values()) | {
     "cli",
+    "explorer",
     "plotting",
     "report",
     "reproduce",

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ._fields import scenario_error
 from .errors import ScenarioError
@@ -21,14 +21,17 @@ else:
     ModelMetaclass = type(BaseModel)
 
 
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(Field,))
 class _CheckedMeta(ModelMetaclass):
     """Only a call from outside comes through here; pydantic builds nested models without calling the class."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:  # noqa: N805
-        try:
-            return super().__call__(*args, **kwargs)
-        except ValidationError as error:
-            raise _translate(cls, error) from None
+    if not TYPE_CHECKING:  # a type checker knows the fields that the constructor takes
+
+        def __call__(cls, *args: Any, **kwargs: Any) -> Any:  # noqa: N805
+            try:
+                return super().__call__(*args, **kwargs)
+            except ValidationError as error:
+                raise _translate(cls, error) from None
 
 
 class CheckedModel(BaseModel, metaclass=_CheckedMeta):

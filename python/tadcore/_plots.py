@@ -2,33 +2,88 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
     from .simulation import Run
 
 
 class Plots:
-    """Figures of one run; every method forwards to the function of that name in `tadcore.plotting`."""
+    """Figures of one run; every method is the function of that name in `tadcore.plotting`, which says more."""
 
     def __init__(self, run: Run) -> None:
         self._run = run
 
-    def trajectories(self, *arguments: Any, **options: Any) -> Any:
-        """Paths in the plane or in space, with capture discs and a mark where a link forms."""
-        return self._draw("trajectories", arguments, options)
+    def trajectories(
+        self,
+        ax: Axes | None = None,
+        *,
+        full: Run | None = None,
+        names: tuple[str, str] = ("limited observations", "full observation"),
+        edge_markers: bool = True,
+        capture_discs: bool = True,
+        title: bool = True,
+        zoom: bool = True,
+    ) -> Axes:
+        """Paths in the plane or in space, with capture discs and a mark where an edge forms."""
+        from .plotting import trajectories
 
-    def network(self, *arguments: Any, **options: Any) -> Any:
+        return trajectories(
+            self._run,
+            ax,
+            full=full,
+            names=names,
+            edge_markers=edge_markers,
+            capture_discs=capture_discs,
+            title=title,
+            zoom=zoom,
+        )
+
+    def network(
+        self, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
+    ) -> Axes | NDArray[Any]:
         """The visibility graph, one panel for each interval, the new edge emphasised."""
-        return self._draw("network", arguments, options)
+        from .plotting import network
 
-    def controls(self, *arguments: Any, **options: Any) -> Any:
+        return network(self._run, axes, max_panels=max_panels, columns=columns)
+
+    def controls(
+        self, axis: str = "x", *, players: Sequence[str] | None = None, ax: Axes | None = None, changes: bool = True
+    ) -> Axes:
         """Controls along one axis, with dashed verticals at network changes."""
-        return self._draw("controls", arguments, options)
+        from .plotting import controls
 
-    def _draw(self, name: str, arguments: tuple[Any, ...], options: dict[str, Any]) -> Any:
-        return getattr(import_module("tadcore.plotting"), name)(self._run, *arguments, **options)
+        return controls(self._run, axis, players=players, ax=ax, changes=changes)
+
+    def distances(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+        """Distances to the attacker, with capture and visibility radii."""
+        from .plotting import distances
+
+        return distances(self._run, ax=ax, changes=changes)
+
+    def visibility(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+        """A raster of who sees whom, edge by time."""
+        from .plotting import visibility
+
+        return visibility(self._run, ax=ax, changes=changes)
+
+    def gains(
+        self, axes: Axes | NDArray[Any] | None = None, *, columns: int = 1, changes: bool = True
+    ) -> Axes | NDArray[Any]:
+        """The rows of the feedback over time, one panel for each player with limited sight."""
+        from .plotting import gains
+
+        return gains(self._run, axes, columns=columns, changes=changes)
+
+    def theta(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+        """The synthesis objective and the terms that make it up."""
+        from .plotting import theta
+
+        return theta(self._run, ax=ax, changes=changes)
 
     def __repr__(self) -> str:
-        return "trajectories(), network(), controls()"
+        return ", ".join(f"{name}()" for name in vars(type(self)) if not name.startswith("_"))

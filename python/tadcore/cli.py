@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import scenarios as bundled
+from ._cli_explore import add_explore
 from ._cli_maps import draw_map, write_report
 from ._cli_study import study
-from ._cli_verify import register as _register_verify
+from ._cli_verify import register as add_verify
 from ._terminal import complain, say
 from .errors import MISSING, ScenarioError, StoreError, TadcoreError
 
@@ -162,6 +163,8 @@ def validate(
 app.command(short_help="Play many games from a study file.")(study)
 app.command(name="map", short_help="Draw the outcome over one player's start.")(draw_map)
 app.command(name="report", short_help="Write a finished study as an HTML page.")(write_report)
+add_explore(app, load_scenario)
+add_verify(app, load_scenario)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -205,9 +208,6 @@ def load_scenario(source: str) -> Scenario:
         raise
 
 
-_register_verify(app, _load)
-
-
 def _usable(out: Path | None) -> None:
     """Refuse a destination that cannot be a folder before anything is computed."""
     if out is not None:
@@ -245,7 +245,7 @@ def _draw(run: Any, out: Path | None) -> None:
     with plotting.style():
         drawn = {"trajectories": run.plot.trajectories(), "network": run.plot.network()}
         drawn |= {f"control-{axis}": run.plot.controls(axis=axis) for axis in "xyz"[: run.scenario.dim]}
-        drawn |= {"distances": plotting.distances(run), "theta": plotting.theta(run)}
+        drawn |= {name: getattr(run.plot, name)() for name in ("distances", "visibility", "gains", "theta")}
         figures = {name: (axes if hasattr(axes, "figure") else axes.flat[0]).figure for name, axes in drawn.items()}
         if out is None:
             plt.show()

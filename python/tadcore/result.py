@@ -167,7 +167,7 @@ class StudyResult:
         )
 
     def compare(self, other: StudyResult, *, level: float = 0.95) -> Comparison:
-        """This study beside another on the same draws, trial by trial: see `tadcore.statistics.compare`.
+        """Set this study beside another on the same draws, trial by trial: see `tadcore.statistics.compare`.
 
         Parameters
         ----------

@@ -58,9 +58,9 @@ class Attacker(CheckedModel):
     position: Position = Field(description="X_a(0), the initial position, 2 or 3 finite numbers")
     control_weight: Positive = Field(description="r_a, the cost of effort")
     capture_radius: Positive = Field(description="σ_a, within which it captures the target")
-    target_running_weight: Positive = Field(1.0, description="q_aτ, weight on the distance to the target")
-    target_terminal_weight: Positive = Field(1.0, description="f_aτ, the same at T")
-    evasion: Fraction = Field(1.0, description="λ: 0 suicidal, 1 evading (I1 only)")
+    target_running_weight: Positive = Field(default=1.0, description="q_aτ, weight on the distance to the target")
+    target_terminal_weight: Positive = Field(default=1.0, description="f_aτ, the same at T")
+    evasion: Fraction = Field(default=1.0, description="λ: 0 suicidal, 1 evading (I1 only)")
 
 
 class Target(CheckedModel):
@@ -75,9 +75,9 @@ class Target(CheckedModel):
 
     position: Position = Field(description="X_τ(0), the initial position, 2 or 3 finite numbers")
     control_weight: Positive = Field(description="r_τ, the cost of effort")
-    running_weight: Positive = Field(1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
-    terminal_weight: Positive = Field(1.0, description="f_τa, the same at T (I1 only)")
-    visibility_radius: Radius = Field(math.inf, description="ζ_τ, how far it sees; inf for unlimited (I2 only)")
+    running_weight: Positive = Field(default=1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
+    terminal_weight: Positive = Field(default=1.0, description="f_τa, the same at T (I1 only)")
+    visibility_radius: Radius = Field(default=math.inf, description="ζ_τ, how far it sees; inf for unlimited (I2 only)")
 
 
 class Defender(CheckedModel):
@@ -89,11 +89,11 @@ class Defender(CheckedModel):
     position: Position = Field(description="X_d(0), the initial position, 2 or 3 finite numbers")
     control_weight: Positive = Field(description="r_d, the cost of effort")
     capture_radius: Positive = Field(description="σ_d, within which it intercepts the attacker")
-    visibility_radius: Radius = Field(math.inf, description="ζ_d, how far it sees; inf for unlimited")
-    running_weight: Positive = Field(1.0, description="q_da, weight on the distance to the attacker (I1 only)")
-    terminal_weight: Positive = Field(1.0, description="f_da, the same at T (I1 only)")
-    evasion_running_weight: Positive = Field(1.0, description="q_ad, the attacker's weight on evading it")
-    evasion_terminal_weight: Positive = Field(1.0, description="f_ad, the same at T")
+    visibility_radius: Radius = Field(default=math.inf, description="ζ_d, how far it sees; inf for unlimited")
+    running_weight: Positive = Field(default=1.0, description="q_da, weight on the distance to the attacker (I1 only)")
+    terminal_weight: Positive = Field(default=1.0, description="f_da, the same at T (I1 only)")
+    evasion_running_weight: Positive = Field(default=1.0, description="q_ad, the attacker's weight on evading it")
+    evasion_terminal_weight: Positive = Field(default=1.0, description="f_ad, the same at T")
 
 
 class Scenario(CheckedModel):
@@ -116,7 +116,7 @@ class Scenario(CheckedModel):
         description='"I1": defenders against attacker and target; "I2": defenders and target, one team'
     )
     horizon: Positive = Field(description="T, the duration")
-    step: Positive = Field(0.005, description="δ, the sampling step; it must divide T")
+    step: Positive = Field(default=0.005, description="δ, the sampling step; it must divide T")
     synthesis_weights: Gamma = Field(
         default_factory=lambda data: _equal_weights(data.get("interaction", "I1")),
         description="γ, weights of the terms of Θ: four in I1, three in I2; equal by default",

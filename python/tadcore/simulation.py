@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
     from ._plots import Plots
+    from .plotting import Animation
     from .scenario import Scenario
 
 __all__ = ["Run", "simulate"]
@@ -107,10 +108,36 @@ class Run:
 
     @property
     def plot(self) -> Plots:
-        """Figures of this run: ``run.plot.trajectories()``, ``.network()``, ``.controls()``."""
+        """Figures of this run by name: ``run.plot.trajectories()``, ``.network()``, ``.controls()`` and so on."""
         from ._plots import Plots
 
         return Plots(self)
+
+    def animate(self, *, seconds: float = 8.0, fps: float = 20.0, width: float = 7.2) -> Animation:
+        """The run as moving pictures: ``run.animate().save("run.gif")``, or shown in a notebook.
+
+        Parameters
+        ----------
+        seconds : float
+            How long the game takes on the screen; rests at network changes and at the end come on top.
+        fps : float
+            Pictures in a second.
+        width : float
+            Width of the pictures in inches.
+
+        Returns
+        -------
+        tadcore.plotting.Animation
+            Its ``save`` writes GIF, MP4 or HTML.
+
+        Raises
+        ------
+        ValueError
+            A number is not positive.
+        """
+        from .plotting import Animation
+
+        return Animation(self, seconds=seconds, fps=fps, width=width)
 
     def save(self, folder: str | os.PathLike[str]) -> None:
         """Write ``run.nc`` (netCDF 3), ``scenario.toml`` and ``summary.json``, each whole or not at all."""

@@ -30,3 +30,22 @@ def reference():
         return json.loads((HERE.parent / "reference" / f"{name}.json").read_text(encoding="utf-8"))
 
     return load
+
+
+@pytest.fixture(scope="module")
+def agg():
+    """Draw without a display for the length of a module."""
+    import matplotlib as mpl
+
+    before = mpl.get_backend()
+    mpl.use("Agg")
+    yield
+    mpl.use(before)
+
+
+@pytest.fixture(scope="session")
+def runs():
+    """Play every bundled scenario once."""
+    import tadcore
+
+    return {name: tadcore.simulate(tadcore.scenarios.load(name)) for name in tadcore.scenarios.names()}

@@ -28,7 +28,7 @@ def test_help_shows_examples_and_exit_codes(tadcore):
     assert (code, err) == (0, "")
     assert "\n    tadcore simulate paper-i1\n" in out
     assert "1 the game has no equilibrium" in out
-    for command in ("simulate", "map", "report", "reproduce", "scenarios", "validate"):
+    for command in ("simulate", "study", "map", "report", "reproduce", "verify", "scenarios", "validate", "explore"):
         code, out, err = tadcore(command, "--help")
         assert (code, err) == (0, "")
         assert len(out) > 200

@@ -16,18 +16,7 @@ from tadcore.plotting import paper
 from tadcore.plotting._ends import spread
 from tadcore.plotting._style import edge_text, look
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _agg():
-    before = mpl.get_backend()
-    mpl.use("Agg")
-    yield
-    mpl.use(before)
-
-
-@pytest.fixture(scope="module")
-def runs():
-    return {name: tadcore.simulate(tadcore.scenarios.load(name)) for name in tadcore.scenarios.names()}
+pytestmark = pytest.mark.usefixtures("agg")
 
 
 @pytest.fixture(scope="module")

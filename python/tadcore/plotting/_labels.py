@@ -134,7 +134,7 @@ class Labels(Artist):
         self, anchors: Floats, sizes: Floats, frame: Floats, unit: float, renderer: RendererBase
     ) -> tuple[Floats, Floats]:
         drawn, radii, prices = self._obstacles(unit)
-        fixed = _legend_boxes(self._ax, renderer)
+        fixed = _boxes(self._ax, renderer)
         direction = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
         places, costs = [], []
         for anchor, size in zip(anchors, sizes, strict=True):
@@ -176,9 +176,11 @@ def _size(text: Text, renderer: RendererBase) -> tuple[float, float]:
     return box.width, box.height
 
 
-def _legend_boxes(ax: Axes, renderer: RendererBase) -> list[Floats]:
+def _boxes(ax: Axes, renderer: RendererBase) -> list[Floats]:
+    """Return the extents of what labels must keep clear of altogether: the legend and the insets."""
     legend = ax.get_legend()
-    return [] if legend is None else [np.array(legend.get_window_extent(renderer).extents)]
+    solid = [*ax.child_axes, *([] if legend is None else [legend])]
+    return [np.array(artist.get_window_extent(renderer).extents) for artist in solid]
 
 
 def _resample(points: Floats, spacing: float) -> Floats:

@@ -71,7 +71,7 @@ def network(
     """
     changes = list(run.network_changes)
     if axes is None:
-        axes = _new_axes(min(len(changes), max_panels), columns)
+        axes = _new_axes(max(min(len(changes), max_panels), 1), columns)
     panels = list(np.asarray(axes, dtype=object).ravel())
     shown = min(len(changes), max_panels, len(panels))
     end = float(run.outcome.time)
@@ -82,12 +82,14 @@ def network(
         edges = (edges | new) - lost
         last = k + 1 == len(changes)
         until = end if last else float(changes[k + 1][0])
-        _graph(panels[k], players(run), edges, new if k else set(), lost)
+        draw_graph(panels[k], players(run), edges, new if k else set(), lost)
         title = panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
         if panels[k].get_window_extent().width < _NARROW * panels[k].figure.dpi:
             title.set_fontsize(min(title.get_fontsize(), _SMALL))
     for panel in panels[shown:]:
         panel.set_axis_off()
+    if not changes:
+        panels[0].text(0.5, 0.5, "over at $t=0$", transform=panels[0].transAxes, ha="center", va="center")
     if shown and shown < len(changes):
         note(panels[shown - 1], f"and {len(changes) - shown} more")
     return axes
@@ -122,7 +124,8 @@ def _places(names: list[str]) -> dict[str, NDArray[np.float64]]:
     return {p: np.array([np.cos(a), np.sin(a)]) for p, a in zip(around, angle, strict=True)}
 
 
-def _graph(ax: Axes, names: list[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
+def draw_graph(ax: Axes, names: list[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
+    """Draw one graph, ``new`` edges thick and ``lost`` ones dotted."""
     at = _places(names)
     node = min(0.2, 0.8 * np.sin(np.pi / len(names)))
     ax.set(xlim=(-1.32, 1.32), ylim=(-1.32, 1.32), xticks=[], yticks=[])

@@ -63,7 +63,7 @@ def controls(
     curves = {p: np.asarray(control.sel(player=p).values, dtype=float) for p in shown}
     _curves(ax, run, curves)
     if changes:
-        _verticals(ax, run)
+        mark_changes(ax, run)
     who = ", ".join(look(p).symbol for p in shown) if len(shown) < 3 else "players"
     ax.set_ylabel(f"control along ${axis}$" if who == "players" else f"control of {who} along ${axis}$")
     return ax
@@ -112,7 +112,7 @@ def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes
     ax.set_ylim(0, top)
     _curves(ax, run, curves, rims)
     if changes:
-        _verticals(ax, run)
+        mark_changes(ax, run)
     ax.set_ylabel("distance to $a$")
     return ax
 
@@ -145,7 +145,7 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     everyone = seen.reshape(len(times), -1).all(axis=1)
     total, terms = np.where(everyone, 0.0, total), np.where(np.expand_dims(everyone, 1), 0.0, terms)
     scale = float(max(total.max(), terms.max()))
-    ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=_span(times))
+    ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=span(times))
     if scale <= 0:
         ax.plot(times, total, color="black")
         ax.set_ylim(-1, 1)
@@ -176,7 +176,7 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
         middle = 0.5 * (quiet + times[-1])
         ax.text(middle, 0.5, r"$\Theta=0$", transform=ax.get_xaxis_transform(), ha="center", va="center", color="0.3")
     if changes:
-        _verticals(ax, run)
+        mark_changes(ax, run)
     return ax
 
 
@@ -190,7 +190,8 @@ def _known(run: Run, shown: Sequence[str]) -> None:
             raise ValueError(f"no player {p!r}; this game has {', '.join(players(run))}")
 
 
-def _span(times: Floats) -> tuple[float, float]:
+def span(times: Floats) -> tuple[float, float]:
+    """Return the limits of the axis of time."""
     return float(times[0]), float(times[-1]) if times[-1] > times[0] else float(times[0]) + 1.0
 
 
@@ -216,12 +217,13 @@ def _curves(ax: Axes, run: Run, curves: dict[str, Floats], rims: Sequence[tuple[
             zorder=2.5,
         )
         ends.append((float(values[-1]), it.symbol, it.colour))
-    ax.set(xlabel="time $t$", xlim=_span(times))
+    ax.set(xlabel="time $t$", xlim=span(times))
     ax.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     label_ends(ax, [*ends, *rims])
 
 
-def _verticals(ax: Axes, run: Run) -> None:
+def mark_changes(ax: Axes, run: Run, *, say: bool = True) -> None:
+    """Mark each network change: a dashed vertical, or a tick at the foot and a remark where they are many."""
     times = [float(change[0]) for change in list(run.network_changes)[1:]]
     kind: dict[str, Any] = {"color": "0.45", "zorder": 1.2}
     if len(times) <= MAX_VERTICALS:
@@ -229,4 +231,5 @@ def _verticals(ax: Axes, run: Run) -> None:
             ax.axvline(t, linewidth=0.7, linestyle=(0, (4, 2.5)), **kind)
         return
     ax.vlines(times, 0.0, 0.04, transform=ax.get_xaxis_transform(), linewidth=0.4, **kind)
-    note(ax, f"{len(times)} network changes, ticks at the foot")
+    if say:
+        note(ax, f"{len(times)} network changes, ticks at the foot")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._inset import crowd, magnify
 from ._labels import Labels
+from ._paths import disc, name_runs, paths, positions
 from ._style import COLUMN, edge_text, look, new_axes, note, outcome_text, players
 
 if TYPE_CHECKING:
@@ -39,9 +39,11 @@ def trajectories(
     ax: Axes | None = None,
     *,
     full: Run | None = None,
+    names: tuple[str, str] = ("limited observations", "full observation"),
     edge_markers: bool = True,
     capture_discs: bool = True,
     title: bool = True,
+    zoom: bool = True,
 ) -> Axes:
     r"""Draw the paths of all players, in 3-D axes when the game is in space.
 
@@ -55,6 +57,8 @@ def trajectories(
         Where to draw; new axes of a one-column figure if not given. Must be 3-D axes for a game in space.
     full : Run, optional
         A second run to lay under the first, dashed: as a rule the same game under full observation.
+    names : (str, str)
+        What the legend calls ``run`` and ``full`` where both are drawn.
     edge_markers : bool
         Whether to mark, on the observer's path, each place where the network changes, with a label such as
         :math:`d_2\to a` for an edge that forms and a struck arrow for one that breaks. Past
@@ -63,6 +67,9 @@ def trajectories(
         Whether to draw the capture disc (sphere) of the player that ended the game, where it ended.
     title : bool
         Whether to write the outcome above the axes.
+    zoom : bool
+        Whether to magnify the end in a free part of the axes where markers would otherwise lie on top of one another.
+        Games in the plane only.
 
     Returns
     -------
@@ -71,41 +78,39 @@ def trajectories(
     """
     dim = int(run.scenario.dim)
     shown = [run] if full is None else [run, full]
-    points = np.concatenate([_positions(r).reshape(-1, dim) for r in shown])
+    points = np.concatenate([positions(r).reshape(-1, dim) for r in shown])
     low, high = points.min(axis=0), points.max(axis=0)
     pad = 0.09 * max(float((high - low).max()), 1e-9)
     low, high = low - pad, high + pad
     ax = _axes(ax, dim, low, high)
-    labels = Labels(ax)
-    if full is not None:
-        _paths(ax, full, labels, dashed=True)
-    _paths(ax, run, labels, dashed=False)
-    if capture_discs:
-        for r in shown:
-            _disc(ax, r, dashed=r is full)
+    marks = _marks(run) if edge_markers else []
+    spots = np.array([mark.point for mark in marks]).reshape(-1, dim)
+
+    def draw(where: Axes, *, marked: bool) -> None:
+        if full is not None:
+            paths(where, full, dashed=True)
+        paths(where, run, dashed=False, marks=spots if marked else None)
+        if capture_discs:
+            for r in shown:
+                disc(where, r, dashed=r is full)
+
+    draw(ax, marked=True)
     _limits(ax, dim, low, high)
-    if edge_markers:
-        _edges(ax, run, labels)
+    ends = np.concatenate([positions(r)[-1] for r in shown])
+    crowded = crowd(ax, ends, low, high) if zoom and dim == 2 else None
+    inset = None
+    if crowded is not None:
+        occupied = np.concatenate([points, spots])
+        pad = float(run.scenario.capture_radii.max())
+        inset = magnify(ax, crowded, occupied, low, high, pad, lambda where: draw(where, marked=False))
+    _labels(ax, shown, marks)
+    if inset is not None:
+        _ends(inset, run)
     if full is not None:
-        handles = [
-            Line2D([], [], color="0.2", linestyle="-", label="limited observations"),
-            Line2D([], [], color="0.2", linestyle=(0, (4, 2)), label="full observation"),
-        ]
-        ax.legend(
-            handles=handles,
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            ncols=2,
-            frameon=False,
-            borderaxespad=0.2,
-        )
+        name_runs(ax, names)
     elif title:
         ax.set_title(outcome_text(run))
     return ax
-
-
-def _positions(run: Run) -> Floats:
-    return np.asarray(run.dataset["position"].transpose("time", "player", "axis").values, dtype=float)
 
 
 def _axes(ax: Axes | None, dim: int, low: Floats, high: Floats) -> Axes:
@@ -133,99 +138,9 @@ def _limits(ax: Axes, dim: int, low: Floats, high: Floats) -> None:
     ax.set_aspect("equal", adjustable="box" if shared else "datalim")
 
 
-def _paths(ax: Axes, run: Run, labels: Labels, *, dashed: bool) -> None:
-    position = _positions(run)
-    for p, player in enumerate(players(run)):
-        path, it = position[:, p], look(player)
-        ax.plot(
-            *path.T,
-            color=it.colour,
-            linestyle=(0, (4, 2)) if dashed else "-",
-            linewidth=1.0 if dashed else None,
-            zorder=2.0 if dashed else 2.5,
-        )
-        labels.avoid_curve(path)
-        end: dict[str, Any] = {"linestyle": "none", "marker": it.marker, "markeredgecolor": it.colour}
-        size = {"*": 7.5, "X": 5.8}.get(it.marker, 4.6)
-        ax.plot(
-            *path[-1:].T,
-            markerfacecolor=it.colour,
-            markersize=size * (0.8 if dashed else 1),
-            zorder=3.2,
-            **end,
-        )
-        labels.avoid_spot(path[-1])
-        if dashed:
-            continue
-        ax.plot(*path[:1].T, markerfacecolor="white", markersize=size, zorder=3.2, **end)
-        labels.avoid_spot(path[0])
-        labels.add(path[0], it.symbol, color=it.colour, zorder=4.6, leader_from=14.0)
-        _heading(ax, path, it.colour)
-
-
-def _heading(ax: Axes, path: Floats, colour: str) -> None:
-    """Draw one arrow half way along a planar path, where the path is long enough to want one."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    if path.shape[1] != 2 or along[-1] < 1e-3 * max(float(np.ptp(path)), 1e-12) or len(path) < 3:
-        return
-    k = int(np.clip(np.searchsorted(along, 0.62 * along[-1]), 1, len(path) - 1))
-    arrow = FancyArrowPatch(
-        (path[k - 1, 0], path[k - 1, 1]),
-        (path[k, 0], path[k, 1]),
-        arrowstyle="-|>",
-        mutation_scale=8,
-        color=colour,
-        linewidth=0,
-        shrinkA=0,
-        shrinkB=0,
-        zorder=2.6,
-    )
-    arrow.set_in_layout(False)
-    ax.add_patch(arrow)
-
-
-def _disc(ax: Axes, run: Run, *, dashed: bool) -> None:
-    """Draw the capture disc of whoever ended the game: the interceptor's, or the attacker's."""
-    names, outcome = players(run), run.outcome
-    if outcome.kind == "timeout":
-        return
-    winner = int(outcome.defender) if outcome.kind == "intercepted" and outcome.defender is not None else -1
-    centre = _positions(run)[-1, winner]
-    radius = float(run.scenario.capture_radii[winner])
-    colour = look(names[winner]).colour
-    if len(centre) == 3:
-        u, v = np.mgrid[0 : 2 * np.pi : 19j, 0 : np.pi : 10j]
-        ball = [np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)]
-        ax.plot_wireframe(  # type: ignore[attr-defined]
-            *(c + radius * b for c, b in zip(centre, ball, strict=True)),
-            color=colour,
-            linewidth=0.3,
-            alpha=0.6,
-        )
-        return
-    style = {"linestyle": (0, (3, 2))} if dashed else {}
-    ax.add_patch(
-        Circle(
-            (centre[0], centre[1]),
-            radius,
-            facecolor=(*_rgb(colour), 0.15),
-            edgecolor=colour,
-            lw=0.8,
-            zorder=2.2,
-            **style,
-        )
-    )
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    from matplotlib.colors import to_rgb
-
-    return to_rgb(colour)
-
-
 def _marks(run: Run) -> list[_Mark]:
     times = np.asarray(run.dataset["time"].values, dtype=float)
-    position, names = _positions(run), players(run)
+    position, names = positions(run), players(run)
     marks = []
     for time, added, removed in list(run.network_changes)[1:]:
         k = int(np.argmin(np.abs(times - time)))
@@ -239,8 +154,35 @@ def _marks(run: Run) -> list[_Mark]:
     return marks
 
 
-def _edges(ax: Axes, run: Run, labels: Labels) -> None:
-    marks = _marks(run)
+def _labels(ax: Axes, shown: list[Run], marks: list[_Mark]) -> None:
+    """Name the players at their starts and the edges at their marks, clear of everything drawn."""
+    labels = Labels(ax)
+    for run in reversed(shown):
+        position = positions(run)
+        for p in range(position.shape[1]):
+            labels.avoid_curve(position[:, p])
+            labels.avoid_spot(position[-1, p])
+    for point, player in zip(positions(shown[0])[0], players(shown[0]), strict=True):
+        it = look(player)
+        labels.avoid_spot(point)
+        labels.add(point, it.symbol, color=it.colour, zorder=4.6, leader_from=14.0)
+    _edges(ax, shown[0], marks, labels)
+
+
+def _ends(inset: Axes, run: Run) -> None:
+    """Name the players that are seen to end in the inset."""
+    labels = Labels(inset)
+    low, high = np.array([inset.get_xlim(), inset.get_ylim()]).T
+    position = positions(run)
+    for p, player in enumerate(players(run)):
+        labels.avoid_curve(position[((position[:, p] > low) & (position[:, p] < high)).all(axis=1), p][:, :])
+        if ((position[-1, p] > low) & (position[-1, p] < high)).all():
+            it = look(player)
+            labels.avoid_spot(position[-1, p])
+            labels.add(position[-1, p], it.symbol, color=it.colour, fontsize="small", leader_from=8.0)
+
+
+def _edges(ax: Axes, run: Run, marks: list[_Mark], labels: Labels) -> None:
     labelled = marks
     if len(marks) > MAX_EDGE_LABELS:
         kinds = list({mark.text: mark for mark in reversed(marks)}.values())[::-1]

@@ -1,0 +1,10 @@
+"""The explorer: a local page on which one drags players and radii and sees the game at once.
+
+Started by ``tadcore explore``. It needs Bokeh (the extra ``explore``); games in the plane only.
+"""
+
+from ._model import Explorer
+from ._page import Page
+from ._server import serve
+
+__all__ = ["Explorer", "Page", "serve"]

@@ -1,0 +1,131 @@
+"""What the explorer knows: a scenario, its run, an instant; no page and no browser."""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore.errors import ScenarioError
+from tadcore.network import edges_of
+from tadcore.simulation import Run, simulate
+
+if TYPE_CHECKING:
+    from tadcore.network import Edge
+    from tadcore.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+MOST_POINTS = 400
+"""No curve goes to the browser with more points than about this."""
+
+
+class Explorer:
+    """A scenario that is being changed, and the run of it as it stands.
+
+    Every change plays the game again. A change that breaks a rule raises `ScenarioError`, one that leaves the game
+    without an equilibrium `NoEquilibriumError`; scenario and run then stay as they were.
+
+    Parameters
+    ----------
+    sc : Scenario
+        Where to begin; a game in the plane.
+
+    Raises
+    ------
+    ScenarioError
+        The game is in space.
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+    """
+
+    def __init__(self, sc: Scenario) -> None:
+        if sc.dim != 2:
+            raise ScenarioError("scenario", f"{sc.dim} axes", "a game in the plane: the explorer draws two axes")
+        self.scenario = sc
+        self.run: Run = simulate(sc)
+        self.time = self.run.outcome.time
+
+    def move(self, player: str, x: float, y: float) -> None:
+        """Start a player elsewhere."""
+        self._change(f"{self._field(player)}.position", (float(x), float(y)))
+
+    def see(self, player: str, radius: float) -> None:
+        """Give a player another visibility radius; inf for unlimited."""
+        self._change(f"{self._field(player)}.visibility_radius", float(radius))
+
+    def capture(self, player: str, radius: float) -> None:
+        """Give a player another capture radius."""
+        self._change(f"{self._field(player)}.capture_radius", float(radius))
+
+    def stretch(self, player: str, x: float, y: float) -> None:
+        """Give a player the visibility radius whose disc, around where it stands now, passes through a point."""
+        centre = self.positions[self.scenario.players.index(player)]
+        self.see(player, round(float(np.hypot(x - centre[0], y - centre[1])), 4))
+
+    def look_at(self, time: float) -> None:
+        """Choose the instant that is shown, within the run."""
+        self.time = float(min(max(time, 0.0), self.run.outcome.time))
+
+    @property
+    def k(self) -> int:
+        """Index of the instant that is shown."""
+        return int(np.argmin(np.abs(self.run.times - self.time)))
+
+    @property
+    def positions(self) -> Floats:
+        """Where everyone stands at the instant that is shown, shape (n + 2, 2)."""
+        return np.asarray(self.run.position[self.k])
+
+    @property
+    def sampled(self) -> NDArray[np.intp]:
+        """Indices of the instants that are drawn: few enough, changes of the network and both ends among them."""
+        last = len(self.run.times) - 1
+        even = np.linspace(0, last, min(last + 1, MOST_POINTS)).round().astype(np.intp)
+        jumps = np.flatnonzero((self.run.adjacency[1:] != self.run.adjacency[:-1]).any(axis=(1, 2))) + 1
+        if len(jumps) > MOST_POINTS:
+            return even
+        return np.unique(np.concatenate([even, jumps, jumps - 1]))
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """Who sees whom at the instant that is shown."""
+        if len(self.run.times) == 1:  # over before anyone looks around
+            return ()
+        return edges_of(self.run.adjacency[self.k], self.scenario.players)
+
+    def toml(self) -> str:
+        """The scenario as TOML."""
+        return self.scenario.to_toml()
+
+    def png(self) -> bytes:
+        """The trajectories as a journal prints them, a PNG."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from tadcore import plotting
+
+        with plotting.style():
+            figure = Figure(figsize=(plotting.COLUMN, 3.0), layout="constrained")
+            FigureCanvasAgg(figure)
+            plotting.trajectories(self.run, figure.add_subplot())
+            picture = io.BytesIO()
+            figure.savefig(picture, format="png", dpi=300)
+        return picture.getvalue()
+
+    def _change(self, field: str, value: object) -> None:
+        at_end = math.isclose(self.time, self.run.outcome.time)
+        scenario = self.scenario.replace({field: value})
+        self.run = simulate(scenario)
+        self.scenario = scenario
+        self.look_at(self.run.outcome.time if at_end else self.time)
+
+    def _field(self, player: str) -> str:
+        if player in ("attacker", "target"):
+            return player
+        if player in self.scenario.players:
+            return f"defenders[{int(player[1:]) - 1}]"
+        raise ScenarioError("player", player, f"one of {', '.join(self.scenario.players)}")

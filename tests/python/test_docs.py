@@ -1,0 +1,131 @@
+"""The documentation: its code runs, its links lead somewhere, and it leaves no public name out."""
+
+import contextlib
+import io
+import re
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import tadcore
+from tadcore import plotting
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted(
+    page for page in DOCS.rglob("*.md") if "_build" not in page.parts and "jupyter_execute" not in page.parts
+)
+CELL = re.compile(r"^```\{code-(?:cell|block)\} python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+EXECUTED = [page for page in PAGES if CELL.search(page.read_text(encoding="utf-8"))]
+
+pytestmark = pytest.mark.usefixtures("agg")
+
+
+def cells(page):
+    return CELL.findall(page.read_text(encoding="utf-8"))
+
+
+def run_cells(page, monkeypatch, tmp_path):
+    """Run every cell of a page in one namespace, IPython's display left out; return what was printed."""
+    import matplotlib.pyplot as plt
+
+    shell, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
+    shell.version_info, display.HTML = (9, 0), str
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
+    printed = io.StringIO()
+    namespace = {"__name__": "page"}
+    with contextlib.redirect_stdout(printed):
+        for number, cell in enumerate(cells(page)):
+            exec(compile(cell, f"{page.name}, cell {number}", "exec"), namespace)
+    plt.close("all")
+    return printed.getvalue()
+
+
+@pytest.mark.parametrize("page", EXECUTED, ids=lambda page: str(page.relative_to(DOCS)))
+def test_the_code_of_a_page_runs(page, monkeypatch, tmp_path):
+    monkeypatch.setattr(plotting.Animation, "to_gif", lambda self, **options: repr(self))  # tested where it belongs
+    printed = run_cells(page, monkeypatch, tmp_path)
+    if page.stem == "errors":
+        said = {line.partition(":")[0] for line in printed.splitlines()}
+        assert {"ScenarioError", "NoEquilibriumError", "ValueError"} <= said
+    if page.stem == "paper":
+        assert re.search(r"paper-i2-full +time +3\.455 +3\.275", printed)
+
+
+def test_the_pages_are_those_that_were_meant():
+    names = {str(page.relative_to(DOCS)) for page in EXECUTED}
+    assert {
+        "errors.md",
+        "guide/run.md",
+        "gallery/paper.md",
+        "gallery/own-scenario.md",
+        "gallery/outcome-map.md",
+    } <= names
+
+
+def test_every_public_name_is_in_the_reference():
+    text = "\n".join(page.read_text(encoding="utf-8") for page in (DOCS / "api").iterdir())
+    named = set(re.findall(r"^\.\. auto(?:class|function|data|module):: ([\w.]+)", text, flags=re.MULTILINE))
+    assert set(tadcore.__all__) - {"__version__"} <= {name.removeprefix("tadcore.") for name in named}
+    assert set(plotting.__all__) <= named
+    assert "tadcore.__version__" in text
+
+
+def test_every_public_name_of_plotting_is_a_figure_or_is_said():
+    index = (DOCS / "guide" / "figures.md").read_text(encoding="utf-8")
+    for name in ("trajectories", "network", "visibility", "controls", "distances", "gains", "theta"):
+        assert f"run.plot.{name}(" in index
+
+
+def test_every_error_has_a_cause_and_a_cure():
+    text = (DOCS / "errors.md").read_text(encoding="utf-8")
+    from tadcore import errors
+
+    for name in errors.__all__:
+        thing = getattr(errors, name)
+        if isinstance(thing, type) and issubclass(thing, Exception) and name != "TadcoreError":
+            assert re.search(rf"^## `{name}`", text, flags=re.MULTILINE), name
+    assert text.count("*Cure*") >= 7
+
+
+def test_every_page_is_in_a_toctree():
+    listed = set()
+    for page in PAGES:
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+            for line in tree.splitlines():
+                if line and not line.startswith(":"):
+                    found = [file for kind in ("md", "rst") for file in page.parent.glob(f"{line.strip()}.{kind}")]
+                    assert found, f"{page.name} lists {line}"
+                    listed |= set(found)
+    assert {*PAGES, *(DOCS / "api").glob("*.rst")} - listed == {DOCS / "index.md"}
+
+
+def test_relative_links_and_pictures_exist():
+    for page in [*PAGES, DOCS.parent / "CONTRIBUTING.md"]:
+        text = page.read_text(encoding="utf-8")
+        for link in re.findall(r"\]\(([^)#:]+)\)|\{(?:image|include|literalinclude)\} (\S+)", text):
+            path = next(filter(None, link))
+            assert (page.parent / path).exists(), f"{page.name}: {path}"
+
+
+def test_the_link_checker_finds_what_leads_nowhere(tmp_path):
+    def check():
+        command = [sys.executable, str(DOCS / "check_links.py"), str(tmp_path)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="b.html#here">b</a><a href="https://x.y/">x</a>')
+    (tmp_path / "b.html").write_text('<p id="here"></p><a href="a.html#top">a</a>')
+    assert check().returncode == 0
+    (tmp_path / "b.html").write_text('<a href="a.html#nowhere">a</a><img src="none.png">')
+    done = check()
+    assert done.returncode == 1
+    assert done.stdout.splitlines() == [
+        "a.html: no anchor for b.html#here",
+        "b.html: no anchor for a.html#nowhere",
+        "b.html: no file for none.png",
+    ]

@@ -1,0 +1,259 @@
+"""The explorer: what a drag does on the server, and the page in a real browser where there is one."""
+
+import base64
+import math
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tadcore
+
+bokeh = pytest.importorskip("bokeh")
+
+from bokeh.document import Document  # noqa: E402
+from bokeh.models import PointDrawTool  # noqa: E402
+
+from tadcore.cli import main  # noqa: E402
+from tadcore.explorer import Explorer, Page  # noqa: E402
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+@pytest.fixture
+def page():
+    return Page(Explorer(tadcore.scenarios.load("paper-i1")))
+
+
+def paths_of(page):
+    data = page.sources["paths"].data
+    return {p: np.column_stack([x, y]) for p, x, y in zip(data["player"], data["x"], data["y"], strict=True)}
+
+
+def test_a_page_shows_the_run_it_stands_for(page):
+    run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+    assert page.status.text == f"<b>{run.outcome}</b>"
+    for p, player in enumerate(run.scenario.players):
+        path = paths_of(page)[player]
+        np.testing.assert_array_equal(path[[0, -1]], run.position[[0, -1], p])
+    seconds = {}
+    bars = page.sources["bars"].data
+    for edge, left, right in zip(bars["edge"], bars["left"], bars["right"], strict=True):
+        seconds[edge] = seconds.get(edge, 0.0) + right - left
+    assert seconds["d2 → a"] == pytest.approx(run.adjacency[:-1, 1, 1].sum() * 0.005)
+    assert seconds["d3 → τ"] == pytest.approx(run.adjacency[:-1, 2, 3].sum() * 0.005)
+    controls = page.sources["controls"].data
+    assert controls["attacker"][0] == pytest.approx(np.linalg.norm(run.control[0, -1]))
+    assert page.time.end == run.outcome.time
+
+
+def test_dragging_a_start_plays_the_game_from_there(page):
+    page.grab(1.02, 1.49)  # d2 stands at (1, 1.5)
+    before = page.sources["starts"].data
+    for x, y in ((1.2, 1.2), (1.5, 0.5), (1.75, -0.5)):
+        page.drag(x, y)
+        expected = tadcore.simulate(tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (x, y)}))
+        assert page.status.text == f"<b>{expected.outcome}</b>"
+        np.testing.assert_array_equal(paths_of(page)["d2"][-1], expected.position[-1, 1])
+    assert page.sources["starts"].data is before, "the browser moves what it drags"
+    page.drop()
+    starts = page.sources["starts"].data
+    assert (starts["x"][1], starts["y"][1]) == (1.75, -0.5)
+
+
+def test_dragging_the_rim_changes_the_radius(page):
+    page.time.value = 0.0
+    handles = page.sources["handles"].data
+    i = handles["player"].index("d3")
+    assert math.hypot(handles["x"][i] + 1.0, handles["y"][i]) == pytest.approx(1.25)
+    page.grab(handles["x"][i], handles["y"][i])
+    page.drag(-1.0, 2.5)
+    page.drop()
+    assert page.explorer.scenario.defenders[2].visibility_radius == 2.5
+    assert page._zeta["d3"][0].value == 2.5
+    discs = page.sources["discs"].data
+    assert discs["r"][discs["player"].index("d3")] == 2.5
+
+
+def test_a_drag_that_holds_nothing_changes_nothing(page):
+    before = page.explorer.run
+    page.grab(-2.0, -1.5)
+    page.drag(0.0, 0.0)
+    assert page.explorer.run is before
+
+
+def test_what_breaks_a_rule_is_said_and_the_game_stands(page):
+    before = page.explorer.run
+    assert page.change(lambda: page.explorer.see("d3", 0.05)) is False
+    assert "visibility_radius: got 0.05, must be larger than the capture radius (0.1)" in page.status.text
+    assert page.explorer.run is before
+    assert page.change(lambda: page.explorer.capture("attacker", 0.2)) is True
+    assert page.explorer.scenario.attacker.capture_radius == 0.2
+
+
+def test_the_time_slider_moves_everyone(page):
+    run = page.explorer.run
+    page.time.value = 0.49
+    k = round(0.49 / 0.005)
+    now = page.sources["now"].data
+    np.testing.assert_array_equal(np.column_stack([now["x"], now["y"]]), run.position[k])
+    assert page.sources["sight"].data["player"].count("d2") == run.adjacency[k, 1].sum() == 4
+    assert [mark.location for mark in page.marks] == [run.times[k]] * 3
+
+
+def test_switching_a_limit_off(page):
+    slider, switch = page._zeta["d2"]
+    switch.active = True
+    assert math.isinf(page.explorer.scenario.defenders[1].visibility_radius)
+    assert slider.disabled
+    assert "d2" not in page.sources["discs"].data["player"]
+    switch.active = False
+    assert page.explorer.scenario.defenders[1].visibility_radius == 2.25
+    slider.value = 3.0
+    assert page.explorer.scenario.defenders[1].visibility_radius == 3.0
+    page._sigma["d1"].value = 0.3
+    assert page.explorer.scenario.capture_radii[0] == 0.3
+
+
+def test_exports_are_what_is_on_the_page(page):
+    def sent():
+        (name,), (href,) = page.download.data["name"], page.download.data["href"]
+        return name, base64.b64decode(href.partition("base64,")[2])
+
+    page.explorer.move("target", 0.3, 0.7)
+    page.save_toml()
+    name, data = sent()
+    assert name == "scenario.toml"
+    assert tadcore.Scenario.from_toml_string(data.decode()) == page.explorer.scenario
+    page.save_png()
+    name, data = sent()
+    assert (name, data[:8]) == ("trajectories.png", b"\x89PNG\r\n\x1a\n")
+
+
+def test_a_document_holds_the_tool_that_drags(page):
+    document = Document()
+    page.add_to(document)
+    (tool,) = document.select({"type": PointDrawTool})
+    assert {renderer.data_source for renderer in tool.renderers} == {page.sources["starts"], page.sources["handles"]}
+    assert document.title == "tadcore explorer"
+    assert document.get_model_by_id(page.download.id) is page.download, "without it no file is ever sent"
+
+
+@pytest.mark.parametrize("name", ["paper-i2", "paper-i1-full"])
+def test_every_kind_of_game_has_a_page(name):
+    page = Page(Explorer(tadcore.scenarios.load(name)))
+    page.add_to(Document())
+    assert str(page.explorer.run.outcome) in page.status.text
+    assert set(page._zeta) == set(page.explorer.scenario.constrained)
+
+
+def test_little_is_sent_for_a_drag(page):
+    """The work behind one picture, counted: the run, and so many numbers to the browser."""
+    page.grab(0.0, 0.0)
+    page.drag(0.1, 0.1)
+    numbers = sum(
+        len(cell) if isinstance(cell, list) else 1
+        for source in page.sources.values() for column in source.data.values() for cell in column
+    )  # fmt: skip
+    assert numbers < 10_000
+
+
+def test_a_game_in_space_is_refused():
+    data = tadcore.scenarios.load("paper-i1").model_dump()
+    for part in (*data["defenders"], data["target"], data["attacker"]):
+        part["position"] = (*part["position"], 0.0)
+    with pytest.raises(tadcore.ScenarioError, match="scenario: got '3 axes', must be a game in the plane"):
+        Explorer(tadcore.Scenario.model_validate(data))
+    with pytest.raises(tadcore.ScenarioError, match="player: got 'd9'"):
+        Explorer(tadcore.scenarios.load("paper-i1")).move("d9", 0.0, 0.0)
+
+
+def start(*options):
+    """Start ``tadcore explore`` as a user does."""
+    code = f"from tadcore.cli import main; main({['explore', 'paper-i1', '--no-browser', *options]!r})"
+    environment = {**os.environ, "PYTHONPATH": str(Path(tadcore.__file__).parents[1])}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen([sys.executable, "-c", code], env=environment, **pipes)
+
+
+@pytest.fixture
+def address():
+    running = start()
+    try:
+        yield re.search(r"http://\S+/", running.stdout.readline())[0]
+    finally:
+        running.terminate()
+        running.communicate(timeout=10)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_in_a_real_browser(address, tmp_path):
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        view = browser.new_page(viewport={"width": 1340, "height": 900})
+        trouble = []
+        view.on("pageerror", lambda error: trouble.append(str(error)))
+        view.goto(address)
+        view.get_by_text("d1 intercepts the attacker at t = 1.395").wait_for(timeout=20_000)
+        view.wait_for_function("Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
+        spot = """([x, y]) => {
+            const plot = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name('arena'));
+            const box = plot.el.getBoundingClientRect();
+            return [box.x + plot.frame.x_scale.compute(x), box.y + plot.frame.y_scale.compute(y)];
+        }"""
+        x, y = view.evaluate(spot, [1.0, 1.5])
+        to_x, to_y = view.evaluate(spot, [1.5, -0.5])
+        view.mouse.move(x, y)
+        view.mouse.down()
+        view.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=5)
+        view.mouse.move(to_x, to_y, steps=5)
+        view.wait_for_timeout(500)
+        during = view.evaluate("Bokeh.documents[0].get_model_by_name('status').text")
+        view.mouse.up()
+        view.wait_for_timeout(500)
+        view.screenshot(path=tmp_path / "explorer.png")
+        with view.expect_download() as caught:
+            view.get_by_text("Scenario as TOML").click()
+        caught.value.save_as(tmp_path / "mine.toml")
+        browser.close()
+    assert trouble == []
+    moved = tadcore.Scenario.from_toml(tmp_path / "mine.toml")
+    assert moved.defenders[1].position == pytest.approx((1.5, -0.5), abs=0.02)
+    assert str(tadcore.simulate(moved).outcome) in during, "the outcome is there before the mouse is let go"
+    assert "d1 intercepts the attacker at t = 1.395" not in during
+
+
+def test_the_page_is_served_to_this_machine(address):
+    with urllib.request.urlopen(address, timeout=20) as answer:
+        assert answer.status == 200
+        assert "<title>tadcore explorer</title>" in answer.read().decode()
+    port = int(address.rstrip("/").rpartition(":")[2])
+    with socket.socket() as elsewhere:  # another address of this machine: only 127.0.0.1 listens
+        elsewhere.settimeout(2)
+        assert elsewhere.connect_ex(("127.0.0.2", port)) != 0
+    second = start("--port", str(port))
+    said = second.communicate(timeout=60)[1]
+    assert second.returncode == 2
+    assert said.startswith("error: ")
+    assert "in use" in said
+
+
+def test_the_command_says_what_it_needs(monkeypatch, capsys):
+    monkeypatch.setattr("tadcore._cli_explore.find_spec", lambda name: None)
+    with pytest.raises(SystemExit) as left:
+        main(["explore"])
+    assert left.value.code == 2
+    assert "pip install 'tadcore[explore]'" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as left:
+        main(["explore", "--help"])
+    assert left.value.code in (0, None)
+    assert "tadcore explore my.toml" in capsys.readouterr().out
