@@ -163,8 +163,6 @@ def validate(
 app.command(short_help="Play many games from a study file.")(study)
 app.command(name="map", short_help="Draw the outcome over one player's start.")(draw_map)
 app.command(name="report", short_help="Write a finished study as an HTML page.")(write_report)
-add_explore(app, load_scenario)
-add_verify(app, load_scenario)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -253,3 +251,8 @@ def _draw(run: Any, out: Path | None) -> None:
             if out is not None:
                 plotting.save(figure, out / name)
             plt.close(figure)
+
+
+# These commands take the loader, which is defined only now.
+add_explore(app, load_scenario)
+add_verify(app, load_scenario)
