@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use tadcore::cancel::CancelToken;
 use tadcore::ensemble::{self, Batch};
 use tadcore::error::EquilibriumError;
@@ -211,6 +211,20 @@ impl Game {
             PyArray1::from_iter(py, ends.iter().map(|(outcome, _)| outcome.defender())),
             PyArray1::from_iter(py, ends.iter().map(|&(_, k)| grid.time(k))),
         ))
+    }
+
+    /// The table of transitions as bytes.
+    fn save_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let policy = self.policy(py)?;
+        let bytes = detach::interruptible(py, |_| policy.save_transitions())?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Adds the entries of a saved table; the number of entries held afterwards.
+    fn load_table(&self, py: Python<'_>, table: &[u8]) -> PyResult<usize> {
+        let policy = self.policy(py)?;
+        detach::interruptible(py, |_| policy.load_transitions(table))?
+            .map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
     /// What the (step, topology) table has done so far.

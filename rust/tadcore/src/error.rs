@@ -73,6 +73,28 @@ pub enum EquilibriumError {
 #[error("cancelled by the caller")]
 pub struct Cancelled;
 
+/// Bytes that are not a table of this game.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum TableError {
+    /// Not a table at all.
+    #[error("the bytes are not a saved table")]
+    Foreign,
+    /// Written in another format.
+    #[error("the table has format {found}, but this version reads format {expected}")]
+    Format {
+        /// The format found.
+        found: u32,
+        /// The format that this version reads.
+        expected: u32,
+    },
+    /// A table of other weights, another grid or another version.
+    #[error("the table belongs to another game, or to another version of tadcore")]
+    OtherGame,
+    /// Cut short or changed.
+    #[error("the table is damaged: its length or its checksum is wrong")]
+    Damaged,
+}
+
 /// A run or a batch could not be done.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RunError {

@@ -116,3 +116,34 @@ fn play(
     pool.install(|| ends.par_chunks_mut(size).enumerate().try_for_each_init(|| Worker::new(policy), one))?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::game::{Interaction, bank};
+    use crate::policy::DEFAULT_TABLE_BYTES;
+
+    /// Plain arrays, AVX2 and AVX-512 end every trial alike and ask for the same entries.
+    #[test]
+    fn widths_agree_to_the_bit() {
+        let start = bank::paper_i1_limited();
+        let cancel = CancelToken::new();
+        for interaction in [Interaction::I1, Interaction::I2] {
+            for n in [1, 2, 3, 5] {
+                // Short enough for an equilibrium with five defenders in I2, which escapes at 0.31.
+                let game = bank::unit_game(interaction, vec![1.0; n], 1.2, 0.8, 1.0, 0.3, 0.001).expect("a valid game");
+                let (visibility, capture) = (vec![1.5; game.constrained()], vec![start.capture[0]; n + 1]);
+                let positions: Vec<f64> = (0..50 * (n + 2) * 2).map(|i| 3.0 * (1.7 * i as f64).sin()).collect();
+                let batch = Batch { dim: 2, positions: &positions, visibility: &visibility, capture: &capture };
+                let played = Width::all().into_iter().map(|width| {
+                    let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
+                    let mut ends = vec![(Outcome::Timeout, 0); 50];
+                    play(&policy, &batch, 1, width, &mut ends, &cancel).expect("a batch");
+                    (ends, policy.save_transitions())
+                });
+                let played: Vec<_> = played.collect();
+                assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n}");
+            }
+        }
+    }
+}

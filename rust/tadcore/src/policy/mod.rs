@@ -12,6 +12,7 @@
 mod budget;
 pub mod closed_loop;
 pub mod exponential;
+mod saved;
 pub(crate) mod shelf;
 mod table;
 pub(crate) mod transitions;

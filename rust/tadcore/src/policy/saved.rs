@@ -1,0 +1,175 @@
+//! A table of transitions as bytes: saved beside a study, read back before the next one, which then starts warm.
+//!
+//! Little-endian: the magic, the format, N, m, K (u32 each, after eight bytes of magic), the game's fingerprint and the
+//! number of entries (u64), then the entries: step (u64), key (words of u64), exp(Cδ) by columns (N² f64). The last
+//! eight bytes are a checksum of all before. The fingerprint covers every weight, the grid and the version of this
+//! crate, since another version may choose other gains.
+
+use super::Policy;
+use super::shelf::padded;
+use crate::error::TableError;
+use crate::game::{Game, Interaction};
+
+const MAGIC: &[u8; 8] = b"tadtable";
+const FORMAT: u32 = 1;
+const HEADER: usize = 8 + 4 * 4 + 2 * 8;
+/// Start value and factor of the checksum (FNV-1a, over words).
+const FNV: (u64, u64) = (0xCBF2_9CE4_8422_2325, 0x0000_0100_0000_01B3);
+
+fn mix(hash: u64, word: u64) -> u64 {
+    // The rotation lets the high bits of a word reach the low bits of the sum.
+    (hash ^ word).wrapping_mul(FNV.1).rotate_left(23)
+}
+
+fn checksum(bytes: &[u8]) -> u64 {
+    let (words, _) = bytes.as_chunks::<8>();
+    words.iter().fold(FNV.0, |hash, word| mix(hash, u64::from_le_bytes(*word)))
+}
+
+/// A number that two games share only if every answer of their policies is the same.
+fn fingerprint(game: &Game) -> u64 {
+    let w = game.weights();
+    let lists = [&w.r_d, &w.q_da, &w.f_da, &w.q_ad, &w.f_ad, &w.gamma];
+    let single = [w.r_tau, w.r_a, w.q_atau, w.f_atau, w.q_taua, w.f_taua, w.lambda, game.grid().horizon()];
+    let numbers = lists.into_iter().flatten().chain(&single).map(|x| x.to_bits());
+    let interaction = u64::from(game.interaction() == Interaction::I1);
+    let sizes = [interaction, game.n() as u64, game.grid().steps() as u64];
+    let version = env!("CARGO_PKG_VERSION").bytes().map(u64::from);
+    version.chain(sizes).chain(numbers).fold(FNV.0, mix)
+}
+
+/// Reads numbers from the front of a slice that was measured before.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn u32(&mut self) -> u32 {
+        self.0.split_off(..4).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> u64 {
+        self.0.split_off(..8).and_then(|b| b.try_into().ok()).map_or(0, u64::from_le_bytes)
+    }
+}
+
+impl Policy {
+    fn words(&self) -> usize {
+        (self.game.constrained() * self.game.size()).div_ceil(64)
+    }
+
+    fn entry_len(&self) -> usize {
+        8 * (1 + self.words() + self.game.size().pow(2))
+    }
+
+    /// The table of transitions as bytes.
+    #[must_use]
+    pub fn save_transitions(&self) -> Vec<u8> {
+        let (size, steps) = (self.game.size(), self.game.grid().steps());
+        let mut out = Vec::new();
+        out.extend_from_slice(MAGIC);
+        for number in [FORMAT, size as u32, self.game.constrained() as u32, steps as u32] {
+            out.extend_from_slice(&number.to_le_bytes());
+        }
+        out.extend_from_slice(&fingerprint(&self.game).to_le_bytes());
+        let count_at = out.len();
+        out.extend_from_slice(&[0; 8]);
+        let mut count = 0u64;
+        for step in 0..steps {
+            let shelf = self.transitions.shelf(step);
+            count += shelf.len() as u64;
+            out.reserve(shelf.len() * self.entry_len());
+            for (i, key) in shelf.keys().enumerate() {
+                out.extend_from_slice(&(step as u64).to_le_bytes());
+                key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+                for column in shelf.matrix(i + 1).chunks_exact(padded(size)) {
+                    column[..size].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+                }
+            }
+        }
+        out[count_at..count_at + 8].copy_from_slice(&count.to_le_bytes());
+        out.extend_from_slice(&checksum(&out).to_le_bytes());
+        out
+    }
+
+    /// Adds the entries of a saved table, as far as the budget goes; says how many there are now.
+    ///
+    /// # Errors
+    /// [`TableError`] for bytes that are no table, or one of another game, version or format; nothing is added then.
+    pub fn load_transitions(&self, bytes: &[u8]) -> Result<usize, TableError> {
+        let (size, steps) = (self.game.size(), self.game.grid().steps());
+        if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
+            return Err(TableError::Foreign);
+        }
+        let mut reader = Reader(&bytes[8..]);
+        let format = reader.u32();
+        if format != FORMAT {
+            return Err(TableError::Format { found: format, expected: FORMAT });
+        }
+        let shape = [reader.u32(), reader.u32(), reader.u32()];
+        let (print, count) = (reader.u64(), reader.u64());
+        if shape != [size as u32, self.game.constrained() as u32, steps as u32] || print != fingerprint(&self.game) {
+            return Err(TableError::OtherGame);
+        }
+        let body = bytes.len() - HEADER - 8;
+        let (data, sum) = bytes.split_at(bytes.len() - 8);
+        let whole = count.checked_mul(self.entry_len() as u64) == Some(body as u64);
+        if !whole || Reader(sum).u64() != checksum(data) {
+            return Err(TableError::Damaged);
+        }
+        let (rows, mut key) = (padded(size), vec![0; self.words()]);
+        let mut matrix = vec![0.0; size * rows];
+        let entries = bytes[HEADER..bytes.len() - 8].chunks_exact(self.entry_len());
+        if entries.clone().any(|entry| Reader(entry).u64() >= steps as u64) {
+            return Err(TableError::Damaged);
+        }
+        for entry in entries {
+            let mut reader = Reader(entry);
+            let step = reader.u64() as usize;
+            key.iter_mut().for_each(|word| *word = reader.u64());
+            for column in matrix.chunks_exact_mut(rows) {
+                column[..size].iter_mut().for_each(|x| *x = f64::from_bits(reader.u64()));
+            }
+            self.transitions.keep(step, &key, &matrix, &self.budget);
+        }
+        Ok(self.transitions.entries.load(std::sync::atomic::Ordering::Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cancel::CancelToken;
+    use crate::ensemble::{self, Batch};
+    use crate::game::bank;
+    use crate::policy::DEFAULT_TABLE_BYTES;
+
+    fn policy(interaction: Interaction) -> Policy {
+        let game = bank::paper_game(interaction, 1.0).expect("a valid game");
+        Policy::new(game, DEFAULT_TABLE_BYTES, &CancelToken::new()).expect("an equilibrium")
+    }
+
+    #[test]
+    fn a_table_comes_back_whole_and_a_damaged_one_is_refused() {
+        let first = policy(Interaction::I1);
+        let start = bank::paper_i1_limited();
+        let positions = start.positions.concat();
+        let batch = Batch { dim: 2, positions: &positions, visibility: &start.visibility, capture: &start.capture };
+        let play = |policy: &Policy| ensemble::run(policy, &batch, Some(1), &CancelToken::new()).expect("a batch");
+        let ends = play(&first);
+        let bytes = first.save_transitions();
+
+        let second = policy(Interaction::I1);
+        assert_eq!(second.load_transitions(&bytes), Ok(first.table().entries));
+        assert_eq!(second.save_transitions(), bytes);
+        assert_eq!(play(&second), ends);
+        assert_eq!(second.table().misses, 0);
+
+        assert_eq!(second.load_transitions(&[]), Err(TableError::Foreign));
+        assert_eq!(policy(Interaction::I2).load_transitions(&bytes), Err(TableError::OtherGame));
+        for at in [HEADER, HEADER + 17, bytes.len() / 2, bytes.len() - 1] {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 4;
+            assert_eq!(second.load_transitions(&damaged), Err(TableError::Damaged), "byte {at}");
+        }
+        assert_eq!(second.load_transitions(&bytes[..bytes.len() - 8]), Err(TableError::Damaged));
+    }
+}

@@ -1,0 +1,144 @@
+//! Ensembles against the recorded runs they stand for: every outcome and every final instant equal, for any size, number
+//! of axes, threads and table.
+
+use tadcore::cancel::CancelToken;
+use tadcore::ensemble::{self, Batch};
+use tadcore::error::RunError;
+use tadcore::game::{Interaction, bank};
+use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
+use tadcore::simulation::{Outcome, Setup, simulate};
+
+/// Numbers in [0, 1), one after another (SplitMix64).
+struct Draws(u64);
+
+impl Draws {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+struct Case {
+    policy: Policy,
+    dim: usize,
+    trials: usize,
+    positions: Vec<f64>,
+    visibility: Vec<f64>,
+    capture: Vec<f64>,
+}
+
+/// M random games of n defenders; their radii differ from trial to trial, or are shared.
+fn case(interaction: Interaction, n: usize, dim: usize, trials: usize, shared: bool, bytes: usize) -> Case {
+    // Unit weights in I2 escape at 0.31 from five defenders on.
+    let horizon = if interaction == Interaction::I2 && n > 3 { 0.25 } else { 1.5 };
+    let mut draws = Draws(1000 * n as u64 + dim as u64);
+    let r_d = (0..n).map(|i| 0.8 + 0.3 * (i % 3) as f64).collect();
+    let game = bank::unit_game(interaction, r_d, 1.2, 0.8, 1.0, horizon, 0.01).expect("a valid game");
+    let m = game.constrained();
+    let rows = if shared { 1 } else { trials };
+    let policy = Policy::new(game, bytes, &CancelToken::new()).expect("an equilibrium");
+    Case {
+        policy,
+        dim,
+        trials,
+        positions: (0..trials * (n + 2) * dim).map(|_| draws.between(-2.0, 2.0)).collect(),
+        visibility: (0..rows * m).map(|_| draws.between(0.4, 3.0)).collect(),
+        capture: (0..rows * (n + 1)).map(|_| draws.between(0.05, 0.3)).collect(),
+    }
+}
+
+impl Case {
+    fn batch(&self) -> Batch<'_> {
+        Batch { dim: self.dim, positions: &self.positions, visibility: &self.visibility, capture: &self.capture }
+    }
+
+    fn play(&self, threads: usize) -> Vec<(Outcome, usize)> {
+        ensemble::run(&self.policy, &self.batch(), Some(threads), &CancelToken::new()).expect("a valid batch")
+    }
+
+    fn one_by_one(&self) -> Vec<(Outcome, usize)> {
+        let game = self.policy.game();
+        let row = |all: &'_ [f64], width: usize, i: usize| -> std::ops::Range<usize> {
+            let i = if all.len() == width { 0 } else { i };
+            i * width..(i + 1) * width
+        };
+        (0..self.trials)
+            .map(|i| {
+                let setup = Setup {
+                    dim: self.dim,
+                    positions: &self.positions[row(&self.positions, (game.n() + 2) * self.dim, i)],
+                    visibility: &self.visibility[row(&self.visibility, game.constrained(), i)],
+                    capture: &self.capture[row(&self.capture, game.size(), i)],
+                };
+                let record = simulate(&self.policy, &setup, &CancelToken::new()).expect("a valid run");
+                (record.outcome, record.steps)
+            })
+            .collect()
+    }
+}
+
+#[test]
+fn every_trial_ends_as_it_would_alone() {
+    let mut kinds = std::collections::HashSet::new();
+    for interaction in [Interaction::I1, Interaction::I2] {
+        for (n, trials) in [(1, 37), (2, 37), (3, 37), (4, 21), (5, 13), (7, 3)] {
+            for dim in [2, 3] {
+                let case = case(interaction, n, dim, trials, n % 2 == 0, DEFAULT_TABLE_BYTES);
+                let ends = case.play(1);
+                assert_eq!(ends, case.one_by_one(), "{interaction:?} {n} {dim}");
+                kinds.extend(ends.iter().map(|(outcome, k)| (outcome.code(), *k > 0)));
+            }
+        }
+    }
+    // Every outcome, at the start and later: 2 × 2 + the timeouts.
+    assert_eq!(kinds.len(), 5, "{kinds:?}");
+    // Beyond the sizes known to the compiler, keys of more than one word, and an odd number of axes.
+    for (n, dim, trials) in [(8, 2, 2), (9, 3, 1), (3, 1, 20), (2, 4, 20)] {
+        let case = case(Interaction::I1, n, dim, trials, true, DEFAULT_TABLE_BYTES);
+        assert_eq!(case.play(1), case.one_by_one(), "{n} {dim}");
+    }
+}
+
+#[test]
+fn threads_and_the_table_change_nothing() {
+    let reference = case(Interaction::I1, 3, 2, 600, true, DEFAULT_TABLE_BYTES);
+    let ends = reference.play(1);
+    let cold = reference.policy.table();
+    assert_eq!(reference.play(1), ends);
+    let warm = reference.policy.table();
+    // Work counts: a warm table solves nothing, and every miss is an entry.
+    assert_eq!((warm.misses, warm.entries), (cold.misses, cold.entries));
+    assert_eq!(cold.misses, cold.entries as u64);
+    for threads in [2, 3, 8] {
+        let other = case(Interaction::I1, 3, 2, 600, true, DEFAULT_TABLE_BYTES);
+        assert_eq!(other.play(threads), ends, "{threads} threads");
+        assert_eq!(other.policy.table().entries, cold.entries, "{threads} threads");
+    }
+    // No room at all, and room for some entries: solved again where they are not kept, never wrong, never over.
+    for bytes in [0, 200_000] {
+        let small = case(Interaction::I1, 3, 2, 600, true, bytes);
+        for threads in [1, 2] {
+            assert_eq!(small.play(threads), ends, "{bytes} bytes");
+        }
+        assert!(small.policy.table().bytes <= bytes, "{:?}", small.policy.table());
+    }
+}
+
+#[test]
+fn a_bad_row_is_refused_before_anything_runs_and_a_raised_token_stops() {
+    let mut bad = case(Interaction::I1, 2, 2, 50, true, DEFAULT_TABLE_BYTES);
+    let token = CancelToken::new();
+    token.cancel();
+    assert!(matches!(ensemble::run(&bad.policy, &bad.batch(), Some(2), &token), Err(RunError::Cancelled(_))));
+    bad.positions[8 * 33 + 5] = f64::NAN;
+    let error = ensemble::run(&bad.policy, &bad.batch(), Some(1), &CancelToken::new()).expect_err("a bad row");
+    assert_eq!(error.to_string(), "positions[2, 1] is NaN, but it must be a finite number");
+    assert_eq!(bad.policy.table().entries, 0);
+}
