@@ -11,6 +11,7 @@ PEERS = Path(__file__).parents[2] / "benches" / "peers"
 SCRIPTS = {
     "riccati": ["P at every node"],
     "synthesis": ["Θ on certified networks", "how far a peer's Θ is below tadcore's", "gains where Θ is equal"],
+    "ensemble": ["one and two threads, share of trials that differ"],
     "run": ["outcome, time and network changes", "positions at every instant"],
 }
 
