@@ -40,6 +40,7 @@ from ._progress import Progress
 from ._samplers import as_sampler
 from ._table import schema_of
 from ._vary import Quantity, normal
+from ._warm import warm
 from .errors import ScenarioError
 from .result import StudyResult, load_study
 from .sampling import Sampler
@@ -186,6 +187,7 @@ class Study:
         threads: int | None = None,
         executor: Executor | None = None,
         until: StoppingRule | None = None,
+        table: str | os.PathLike[str] | None = None,
     ) -> StudyResult:
         """Play the trials.
 
@@ -203,6 +205,9 @@ class Study:
             this process does, one chunk after another.
         until : StoppingRule, optional
             Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
+        table : path, optional
+            A file that keeps the game's table of transitions from study to study: read before, written after. With it
+            a study of the same game starts warm; the outcomes are the same. Not used by an executor's workers.
 
         Returns
         -------
@@ -236,9 +241,9 @@ class Study:
         game_of(self.scenario).equilibrium()
         schema = schema_of(self.columns)
         opened = contextlib.nullcontext() if store is None else Store.writing(store, self._manifest(), schema)
-        with opened as kept, Progress(self.trials, wanted=progress) as bar:
-            table = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
-            return StudyResult(self, table)
+        with opened as kept, warm(self.scenario, table), Progress(self.trials, wanted=progress) as bar:
+            trials = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
+            return StudyResult(self, trials)
 
     def _manifest(self) -> Manifest:
         return Manifest(

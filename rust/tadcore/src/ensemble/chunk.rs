@@ -93,9 +93,8 @@ impl<'a> Chunk<'a> {
             if !w.waiting.is_empty() {
                 w.missing.sort_unstable();
                 w.missing.dedup();
-                misses += w.missing.len() as u64;
                 w.local.clear();
-                self.policy.fill(k, &w.missing, &mut w.local, &mut w.filler, cancel)?;
+                misses += self.policy.fill(k, &w.missing, &mut w.local, &mut w.filler, cancel)?;
                 self.follow(k, w);
             }
             if self.strips.live == 0 {

@@ -120,6 +120,7 @@ pub(crate) struct Filler {
 
 impl Policy {
     /// Makes the entries of `missing` at an instant available: in the table, or in `local` where the budget is used up.
+    /// Says how many this thread solved.
     pub(crate) fn fill(
         &self,
         step: usize,
@@ -127,11 +128,13 @@ impl Policy {
         local: &mut Shelf,
         filler: &mut Filler,
         cancel: &CancelToken,
-    ) -> Result<(), Cancelled> {
+    ) -> Result<u64, Cancelled> {
         let claims = &self.transitions.claims[step];
         let problem = self.problem(step);
         let free = self.free_rows(step);
+        let mut solved = 0;
         let mut solve = |topology: &Topology, local: &mut Shelf| {
+            solved += 1;
             match self.table.peek(step, topology) {
                 Some(known) => filler.lay_out(&known),
                 None => {
@@ -171,7 +174,7 @@ impl Policy {
                 solve(topology, local);
             }
         }
-        Ok(())
+        Ok(solved)
     }
 }
 
