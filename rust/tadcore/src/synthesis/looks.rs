@@ -2,12 +2,12 @@
 //!
 //! 1. Newton from the canonical start. Most entries end here: the certificate of `objective` proves the
 //!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
-//! 2. Otherwise a second look in complex gains and a third in stacked gains, each with a small and with a large second
-//!    part B, all from the canonical start with a fixed pattern of B. Each descends without long jumps between basins
-//!    and comes back to the real gains A, A + B and A − B, from where Newton finishes.
-//! 3. A last look: Newton from the canonical start without one row at a time, then from the best point with one row,
-//!    two rows or one gain reversed, again while that goes lower: GᵀRG does not see the sign of a row, so minima come
-//!    in families that differ by signs.
+//! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a fixed
+//!    pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes back
+//!    to the real gains A, A + B and A − B, from where Newton finishes.
+//! 3. A last look: Newton from the canonical start without one row at a time, then from the best point with one row or
+//!    two rows reversed, again while that goes lower: GᵀRG does not see the sign of a row, so minima come in families
+//!    that differ by signs.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
@@ -28,19 +28,19 @@ pub enum Look {
     Complex,
     /// The third look, in stacked gains.
     Stacked,
-    /// The last look, with rows or single gains reversed or left out.
+    /// The last look, with rows reversed or left out.
     Reversed,
 }
 
-/// Sizes of the second part B at the start, relative to ‖F‖: a small one, and one as large as the gains themselves.
-const FAR: [f64; 2] = [0.1, 1.0];
+/// Size of the second part B at the start, relative to ‖F‖.
+const FAR: f64 = 1.0;
 /// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
 const LONGEST_STEP: f64 = 0.3;
 /// Relative gradient at which a second or third look has found its basin.
 const BASIN: f64 = 1e-6;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
-/// Constrained players up to which pairs of rows and single gains are reversed too; beyond, one row at a time.
+/// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
 const PAIRS_UP_TO: usize = 8;
 /// Rounds of reversals, each from the best point of the one before.
 const ROUNDS: usize = 4;
@@ -116,13 +116,9 @@ pub(super) fn search<const N: usize, const M: usize>(
     }
     let scales = (real.gradient_scale(&start), real.value_scale());
     let mut complex = ComplexGains::<N, M>::new(problem, scales);
-    for far in FAR {
-        look(&mut complex, Look::Complex, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    }
+    look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
     let mut stacked = RealGains::<N, M>::new(problem, 2);
-    for far in FAR {
-        look(&mut stacked, Look::Stacked, far, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    }
+    look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
     for i in 0..problem.rows {
         scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
         finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
@@ -178,7 +174,7 @@ impl<const N: usize, const M: usize> Doubled for RealGains<'_, N, M> {
     }
 }
 
-/// Newton from the point in `g` with one row, two rows or one variable reversed.
+/// Newton from the point in `g` with one row or two rows reversed.
 fn reversals<const N: usize, const M: usize>(
     problem: &Problem,
     real: &mut RealGains<N, M>,
@@ -197,14 +193,6 @@ fn reversals<const N: usize, const M: usize>(
             if s.trial != from {
                 finish(Look::Reversed, real, variables, g, best, limits, s);
             }
-        }
-    }
-    if m <= PAIRS_UP_TO {
-        for v in variables {
-            s.trial.clear();
-            s.trial.extend_from_slice(&from);
-            start::advance(&mut s.trial, &[*v], &[-2.0 * from[v.entry]]);
-            finish(Look::Reversed, real, variables, g, best, limits, s);
         }
     }
 }
@@ -229,7 +217,6 @@ fn spread(len: usize, size: f64, phase: f64, out: &mut Vec<f64>) {
 fn look<const N: usize, const M: usize, O: Doubled>(
     doubled: &mut O,
     name: Look,
-    far: f64,
     problem: &Problem,
     real: &mut RealGains<N, M>,
     variables: &[Variable],
@@ -243,7 +230,7 @@ fn look<const N: usize, const M: usize, O: Doubled>(
     s.doubled.clear();
     s.doubled.extend_from_slice(variables);
     s.doubled.extend(variables.iter().map(|v| Variable { entry: v.entry + width, own: v.own + width, ..*v }));
-    let size = far * scale / (variables.len() as f64).sqrt();
+    let size = FAR * scale / (variables.len() as f64).sqrt();
     spread(variables.len(), size, 1.0, &mut s.shift);
     s.pair.clear();
     s.pair.extend_from_slice(start);
