@@ -63,9 +63,17 @@ def test_the_pages_are_those_that_were_meant():
     assert {
         "errors.md",
         "guide/run.md",
+        "guide/studies.md",
+        "guide/statistics.md",
+        "guide/maps.md",
         "gallery/paper.md",
         "gallery/own-scenario.md",
+        "gallery/million.md",
+        "gallery/radius.md",
         "gallery/outcome-map.md",
+        "gallery/nash.md",
+        "gallery/dask.md",
+        "verification.md",
     } <= names
 
 
