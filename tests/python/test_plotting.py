@@ -87,6 +87,17 @@ def test_the_style_ends_with_its_block():
     assert dict(mpl.rcParams) == before
 
 
+def test_what_a_backend_switches_on_in_the_block_stays_on():
+    before = mpl.is_interactive()
+    try:
+        mpl.interactive(False)
+        with plotting.style():
+            mpl.interactive(True)  # as a notebook's does when the first figure loads it
+        assert mpl.is_interactive()
+    finally:
+        mpl.interactive(before)
+
+
 def test_network_fills_the_axes_given_and_switches_the_others_off(runs):
     figure = Figure()
     axes = figure.subplots(2, 4)

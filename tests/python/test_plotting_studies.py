@@ -1,5 +1,6 @@
 """Figures of studies: what they show, that they come back in the axes given, and that they read in grey."""
 
+import contextlib
 import copy
 from itertools import combinations
 
@@ -167,9 +168,22 @@ def test_the_stack_of_incidence_ends_in_the_share_that_ended(said):
     tops = [line.get_ydata()[-1] for line in ax.lines[:4]]
     assert tops == pytest.approx(np.cumsum([found["d1"][-1], found["d2"][-1], found["d3"][-1], found["captured"][-1]]))
     assert tops[-1] == pytest.approx(1 - found["timeout"][-1])
-    assert [t.get_text() for t in ax.get_legend().get_texts()] == [f"by $d_{{{i}}}$" for i in (1, 2, 3)] + ["captured"]
+    shown = [f"by $d_{{{i}}}$" for i in (1, 2, 3)] + ["captured", "95 % band of interception"]
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == shown
     bare = plotting.incidence(found, agg_figure()[1], bands=False)
     assert len(bare.lines) == 4
+
+
+@pytest.mark.parametrize("styled", [False, True])
+def test_a_legend_above_leaves_the_axes_their_width(styled):
+    found = tadcore.outcome_map(tadcore.scenarios.load("paper-i1"), x=(-3, 3, 13), y=(-2, 4, 13))
+    with plotting.style() if styled else contextlib.nullcontext():
+        ax = found.plot()
+        ax.figure.draw_without_rendering()
+    legend, figure = ax.get_legend().get_window_extent(), ax.figure.bbox
+    assert len(ax.get_legend().get_texts()) == 5
+    assert legend.width <= figure.width
+    assert ax.bbox.width > 0.6 * figure.width
 
 
 def test_a_comparison_fills_what_is_sure(said):

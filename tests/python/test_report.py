@@ -2,10 +2,9 @@
 
 import base64
 import re
-import sys
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -15,6 +14,7 @@ import tadcore
 from tadcore import ScenarioError
 from tadcore.cli import main
 from tadcore.report import report
+from tadcore.sampling import Disk
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -135,16 +135,19 @@ def test_what_cannot_be_reported_is_refused(result, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_writes_the_page(result, tmp_path, monkeypatch, capsys):
-    study = ModuleType("tadcore.study")
-    study.StudyResult = SimpleNamespace(load=lambda folder: result)
-    monkeypatch.setitem(sys.modules, "tadcore.study", study)
-    out = tmp_path / "page.html"
+def test_the_command_writes_the_page(tmp_path, capsys):
+    store, out = tmp_path / "store", tmp_path / "page.html"
+    vary = {"attacker.position": Disk([-2.0, 2.0], 0.5)}
+    result = tadcore.Study(tadcore.scenarios.load("paper-i1"), vary, trials=12, seed=7).run(store=store)
     with pytest.raises(SystemExit) as left:
-        main(["report", str(tmp_path), "--out", str(out), "--title", "Mine"])
+        main(["report", str(store), "--out", str(out), "--title", "Mine"])
     assert not left.value.code
-    assert "<h1>Mine</h1>" in out.read_text(encoding="utf-8")
-    assert capsys.readouterr().out == f"200 trials; written to {out}\n"
+    text = out.read_text(encoding="utf-8")
+    assert "<h1>Mine</h1>" in text
+    rows = {row[0]: row[1:] for row in reversed(Page(text).rows) if row}
+    for name, count in result.counts().items():
+        assert rows[name][0] == str(count)
+    assert capsys.readouterr().out == f"12 trials; written to {out}\n"
     with pytest.raises(SystemExit) as left:
-        main(["report", str(tmp_path), "--out", str(tmp_path)])
+        main(["report", str(store), "--out", str(tmp_path)])
     assert left.value.code == 2

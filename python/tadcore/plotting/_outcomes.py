@@ -63,18 +63,26 @@ def boxes(names: Sequence[str]) -> list[Patch]:
 
 
 def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **options: Any) -> Legend:
-    """A legend in a row above the axes, where it covers nothing."""
+    """A legend above the axes, where it covers nothing: in one row, or in as many as its share of the width needs."""
     settings: dict[str, Any] = {
         "loc": "lower center",
         "bbox_to_anchor": (0.5, 1.0),
-        "ncols": columns or len(handles),
         "frameon": False,
         "columnspacing": 0.9,
         "handlelength": 1.7,
         "handletextpad": 0.4,
         "borderaxespad": 0.2,
     }
-    return ax.legend(handles=list(handles), **{**settings, **options})
+    most, figure = columns or len(handles), ax.get_figure(root=True)
+    assert figure is not None
+    place = ax.get_subplotspec()
+    share = len(place.colspan) / place.get_gridspec().ncols if place is not None else 1.0
+    for rows in range(-(-len(handles) // most), len(handles) + 1):
+        legend = ax.legend(handles=list(handles), ncols=-(-len(handles) // rows), **{**settings, **options})
+        # one that is wider takes its width from the axes, and leaves them nothing
+        if legend.get_window_extent().width <= share * figure.bbox.width:
+            break
+    return legend
 
 
 def quantity_label(name: str) -> str:

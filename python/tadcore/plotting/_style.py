@@ -7,6 +7,7 @@ print loses nothing.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -122,8 +123,12 @@ def style() -> Iterator[None]:
     Every function of this package draws in whatever style is in force, so this is for the reader who wants the look of
     the bundled figures. Draw and save inside the block: ticks take their font when they are first drawn.
     """
-    with mpl.rc_context(_PAPER):
-        yield
+    with contextlib.ExitStack() as last, mpl.rc_context(_PAPER):
+        try:
+            yield
+        finally:
+            # a notebook's backend switches this on when the first figure loads it, which may be in the block
+            last.callback(mpl.interactive, mpl.is_interactive())
 
 
 def note(ax: Axes, text: str) -> None:

@@ -85,15 +85,15 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
             ax.fill_between(found.times, base, top, facecolor=it.fill, hatch=it.hatch, edgecolor="0.35", **steps)
             ax.step(found.times, top, where="post", color="0.25", linewidth=0.6)
             base = top
+        handles: list[Any] = list(boxes(names))
         if bands:
             i = found.names.index("intercepted")
             for edge in (found.low[i], found.high[i]):
                 ax.step(found.times, edge, where="post", color="black", linewidth=0.8, linestyle=(0, (1, 1.2)))
             label = f"{100 * found.level:g} % band of interception"
             line = Line2D([], [], color="black", linewidth=0.8, linestyle=(0, (1, 1.2)), label=label)
-            # the second legend of an axes replaces the first unless that is kept as an artist of its own
-            ax.add_artist(ax.legend(handles=[line], loc="upper left", frameon=False, borderaxespad=0.3))
-        above(ax, boxes(names))
+            handles.append(line)
+        above(ax, handles)
         ax.set_ylim(0.0, 1.0)
     else:
         ends = []
