@@ -140,16 +140,17 @@ def _capture(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.f
 def _rows(
     name: str, given: NDArray[np.float64], games: int, columns: int, meaning: str, *, finite: bool
 ) -> NDArray[np.float64]:
-    """One row of positive radii for each game, or one for all."""
+    """One row of positive radii for each game, or a single one for all."""
     if given.shape not in ((columns,), (games, columns)):
         rule = f"of shape ({columns},) or ({games}, {columns}): {meaning}"
         raise ScenarioError(name, f"shape {given.shape}", rule)
     good = (given > 0.0) & (np.isfinite(given) if finite else ~np.isnan(given))
     refuse_where(name, given, ~good, "a positive finite number" if finite else "a positive number, or inf")
-    return np.ascontiguousarray(np.broadcast_to(given, (games, columns)))
+    return np.ascontiguousarray(np.atleast_2d(given))
 
 
 def _compare(capture: NDArray[np.float64], sight: NDArray[np.float64], n: int) -> None:
     """Whoever intercepts sees the attacker: σ < ζ for every defender."""
     bad = capture[:, :n] >= sight[:, :n]
-    refuse_where("visibility_radii", sight[:, :n], bad, "larger than the defender's capture radius")
+    shown = np.broadcast_to(sight[:, :n], bad.shape)
+    refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")
