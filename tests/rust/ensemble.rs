@@ -3,7 +3,7 @@
 
 use tadcore::cancel::CancelToken;
 use tadcore::ensemble::{self, Batch};
-use tadcore::error::RunError;
+use tadcore::error::{RunError, TableError};
 use tadcore::game::{Interaction, bank};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{Outcome, Setup, simulate};
@@ -141,4 +141,30 @@ fn a_bad_row_is_refused_before_anything_runs_and_a_raised_token_stops() {
     let error = ensemble::run(&bad.policy, &bad.batch(), Some(1), &CancelToken::new()).expect_err("a bad row");
     assert_eq!(error.to_string(), "positions[2, 1] is NaN, but it must be a finite number");
     assert_eq!(bad.policy.table().entries, 0);
+}
+
+#[test]
+fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
+    let make = |interaction, n| case(interaction, n, 2, 40, true, DEFAULT_TABLE_BYTES);
+    for n in [2, 3, 4] {
+        let first = make(Interaction::I1, n);
+        let ends = first.play(1);
+        let bytes = first.policy.save_transitions();
+
+        let second = make(Interaction::I1, n);
+        assert_eq!(second.policy.load_transitions(&bytes), Ok(first.policy.table().entries));
+        assert_eq!(second.policy.save_transitions(), bytes);
+        assert_eq!(second.play(1), ends);
+        assert_eq!(second.policy.table().misses, 0);
+
+        let load = |bytes: &[u8]| second.policy.load_transitions(bytes);
+        assert_eq!(load(&[]), Err(TableError::Foreign));
+        assert_eq!(make(Interaction::I2, n).policy.load_transitions(&bytes), Err(TableError::OtherGame));
+        for at in [40, 57, bytes.len() / 2, bytes.len() - 1] {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 4;
+            assert_eq!(load(&damaged), Err(TableError::Damaged), "byte {at}");
+        }
+        assert_eq!(load(&bytes[..bytes.len() - 8]), Err(TableError::Damaged));
+    }
 }
