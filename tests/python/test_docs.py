@@ -32,7 +32,7 @@ def run_cells(page, monkeypatch, tmp_path):
     import matplotlib.pyplot as plt
 
     shell, display = types.ModuleType("IPython"), types.ModuleType("IPython.display")
-    shell.version_info, display.HTML = (9, 0), str
+    shell.version_info, shell.get_ipython, display.HTML = (9, 0), lambda: None, str
     monkeypatch.setitem(sys.modules, "IPython", shell)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.chdir(tmp_path)
