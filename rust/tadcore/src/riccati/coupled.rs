@@ -28,8 +28,8 @@ use crate::error::EquilibriumError;
 use crate::game::Game;
 use crate::width::{Width, widened};
 
-/// Local error per step, in the weighted norm of [`dop853`]. Over random games this keeps every node to 3e-12 (weights
-/// within two orders of magnitude) or to what the conditioning of the game allows.
+/// Local error per step, in the weighted norm of [`dop853`]. Over 196 random games (n = 1…12, weights within two orders of
+/// magnitude) this keeps every node to 4e-12, in the median to 4e-13; else to what the conditioning of the game allows.
 const TOLERANCE: f64 = 3e-13;
 
 struct Coupled {

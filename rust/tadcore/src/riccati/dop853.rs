@@ -1,11 +1,11 @@
 //! dy/ds = f(y): an adaptive integrator of order 8 with dense output of order 7.
 //!
 //! y is a stack of equally large blocks, one symmetric matrix per objective, padded with zeros to whole vector lanes.
-//! The step is accepted when in every block by itself ‖e‖ ≤ `tolerance`, with e_ij the estimated error of entry (i, j)
-//! divided by m_i m_j, m_i² being the largest entry of row i: a small matrix beside a large one keeps its digits, and so
-//! do small rows beside large ones. (On games whose weights span four orders of magnitude this gives errors up to ten times
-//! smaller than one scale per matrix, for 5 % more steps.) Values at the grid's nodes come from the dense output;
-//! steps are never cut to hit a node other than the last.
+//! The step is accepted when in every block by itself ‖e‖ ≤ `tolerance` ‖y‖, both in the norm that divides entry (i, j)
+//! by m_i m_j, m_i² being the largest entry of row i: a small matrix beside a large one keeps its digits, and so do small
+//! rows beside large ones. (On games whose weights span four orders of magnitude this gives errors up to ten times smaller
+//! than one scale per matrix, for 5 % more steps.) Values at the grid's nodes come from the dense output; steps are never
+//! cut to hit a node other than the last.
 //!
 //! | symbol | name here | meaning |
 //! |---|---|---|
@@ -98,12 +98,14 @@ impl Workspace {
         let mut worst = 0.0_f64;
         for start in (0..self.len).step_by(self.block) {
             self.weigh(start, flow.shape());
-            let (five, three) = lanes::error_sums(self.width, &self.k, &self.point, start, self.block);
+            let (five, three, size) =
+                lanes::error_sums(self.width, &self.k, &self.y_new, &self.point, start, self.block);
             if !(five.is_finite() && three.is_finite()) {
                 return f64::NAN;
             }
             if five > 0.0 {
-                worst = worst.max(h * five / (five + 0.01 * three).sqrt());
+                // The largest entry of a matrix weighs one: a size below that is a matrix of zeros.
+                worst = worst.max(h * five / ((five + 0.01 * three) * size.max(1.0)).sqrt());
             }
         }
         worst

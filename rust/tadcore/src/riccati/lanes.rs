@@ -67,23 +67,25 @@ widened! {
 }
 
 widened! {
-    /// Σ (w e5)² and Σ (w e3)² over the block of entries from `start`.
+    /// Σ (w e5)², Σ (w e3)² and Σ (w y)² over the block of entries from `start`.
     #[inline(never)]
-    pub(super) fn error_sums(k: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64) {
+    pub(super) fn error_sums(k: &[f64], y: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
         let len = weight.len();
         let k5 = stages(k, len, &t::E5).map(|k| &k[start..][..block]);
         let k3 = stages(k, len, &t::E3).map(|k| &k[start..][..block]);
-        let weight = &weight[start..][..block];
-        let (mut five, mut three) = ([0.0; LANES], [0.0; LANES]);
+        let (y, weight) = (&y[start..][..block], &weight[start..][..block]);
+        let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for c in 0..block / LANES {
             for i in 0..LANES {
                 let at = c * LANES + i;
                 let (e5, e3) = (weight[at] * sum(&k5, &t::E5, at), weight[at] * sum(&k3, &t::E3, at));
                 five[i] += e5 * e5;
                 three[i] += e3 * e3;
+                let part = weight[at] * y[at];
+                size[i] += part * part;
             }
         }
-        (five.iter().sum(), three.iter().sum())
+        (five.iter().sum(), three.iter().sum(), size.iter().sum())
     }
 }
 

@@ -1,8 +1,8 @@
 //! Cholesky factorisation of small dense symmetric matrices, in place, and the solve that goes with it.
 //!
-//! Newton systems here have at most mN unknowns: 12 for three defenders, where a plain row-by-row factorisation beats
-//! any library call. Past [`LIBRARY_SIZE`] unknowns faer's blocked factorisation takes over: it wins from about a
-//! hundred on, and by ten at several hundred.
+//! Newton systems here have at most mN unknowns: 12 for three defenders, where plain loops beat any library call. Past
+//! [`LIBRARY_SIZE`] unknowns faer's blocked factorisation takes over: it wins from about a hundred on, and by ten at
+//! several hundred.
 
 use faer::linalg::cholesky::llt;
 use faer::{MatMut, Par};
@@ -14,32 +14,39 @@ const LIBRARY_SIZE: usize = 96;
 /// positive definite to working precision.
 #[inline(always)]
 pub(super) fn factorise(a: &mut [f64], d: usize) -> bool {
-    if d >= LIBRARY_SIZE { factorise_large(a, d) } else { factorise_small(a, d) }
+    match d {
+        0..=16 => factorise_small::<16>(a, d),
+        17..LIBRARY_SIZE => factorise_small::<LIBRARY_SIZE>(a, d),
+        _ => factorise_large(a, d),
+    }
 }
 
+/// Column by column, each taken off all that follow at once: the updates of a row do not wait for one another, as the
+/// terms of a dot product would. The operations on each entry and their order are those of the row-by-row form.
 #[inline(always)]
-fn factorise_small(a: &mut [f64], d: usize) -> bool {
-    for j in 0..d {
-        let (done, rest) = a.split_at_mut(j * d);
-        let row = &mut rest[..d];
-        for k in 0..j {
-            let other = &done[k * d..k * d + k + 1];
-            let mut sum = row[k];
-            for (x, y) in row[..k].iter().zip(&other[..k]) {
-                sum -= x * y;
-            }
-            // The diagonal holds reciprocals while factorising, so that the inner solves multiply.
-            row[k] = sum * other[k];
-        }
-        let mut pivot = row[j];
-        let original = pivot;
-        for x in &row[..j] {
-            pivot -= x * x;
-        }
-        if pivot.is_nan() || pivot <= f64::EPSILON * original.abs() || original <= 0.0 {
+fn factorise_small<const SIZE: usize>(a: &mut [f64], d: usize) -> bool {
+    let (mut original, mut column) = ([0.0; SIZE], [0.0; SIZE]);
+    for i in 0..d {
+        original[i] = a[i * d + i];
+    }
+    for k in 0..d {
+        let pivot = a[k * d + k];
+        if pivot.is_nan() || pivot <= f64::EPSILON * original[k].abs() || original[k] <= 0.0 {
             return false;
         }
-        row[j] = 1.0 / pivot.sqrt();
+        // The diagonal holds reciprocals, so that the solves multiply.
+        let reciprocal = 1.0 / pivot.sqrt();
+        a[k * d + k] = reciprocal;
+        for i in k + 1..d {
+            a[i * d + k] *= reciprocal;
+            column[i] = a[i * d + k];
+        }
+        for i in k + 1..d {
+            let factor = column[i];
+            for (x, c) in a[i * d + k + 1..i * d + i + 1].iter_mut().zip(&column[k + 1..i + 1]) {
+                *x -= factor * c;
+            }
+        }
     }
     true
 }
@@ -74,13 +81,25 @@ fn factorise_large(a: &mut [f64], d: usize) -> bool {
 /// Solves L Lᵀ x = b in place with a factor from [`factorise`].
 #[inline(always)]
 pub(super) fn solve(l: &[f64], d: usize, x: &mut [f64]) {
-    for i in 0..d {
-        let row = &l[i * d..i * d + i + 1];
-        let mut sum = x[i];
-        for (a, b) in row[..i].iter().zip(&x[..i]) {
-            sum -= a * b;
+    if d >= LIBRARY_SIZE {
+        // By rows, which lie together in memory.
+        for i in 0..d {
+            let row = &l[i * d..i * d + i + 1];
+            let mut sum = x[i];
+            for (a, b) in row[..i].iter().zip(&x[..i]) {
+                sum -= a * b;
+            }
+            x[i] = sum * row[i];
         }
-        x[i] = sum * row[i];
+    } else {
+        // By columns, whose entries do not wait for one another.
+        for j in 0..d {
+            let value = x[j] * l[j * d + j];
+            x[j] = value;
+            for i in j + 1..d {
+                x[i] -= l[i * d + j] * value;
+            }
+        }
     }
     for i in (0..d).rev() {
         let row = &l[i * d..i * d + i + 1];
