@@ -42,7 +42,8 @@ pub struct Record {
 /// Runs one game and records everything.
 ///
 /// # Errors
-/// [`RunError`] for positions or radii that break a rule, or when the caller cancelled.
+/// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision, or when
+/// the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
     setup.check(policy.game())?;
     let game = policy.game();
@@ -78,6 +79,9 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
         }
         let step = policy.at(k, &topology, &mut solver);
         record.push(policy, k, &z, &attacker, &topology, &step);
+        if !record.last_row_is_finite(n + 2) {
+            return Err(RunError::Range { trial: None, time: game.grid().time(k) });
+        }
         if let Some(outcome) = end {
             record.outcome = outcome;
             record.steps = k;
@@ -111,6 +115,12 @@ pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
 }
 
 impl Record {
+    fn last_row_is_finite(&self, players: usize) -> bool {
+        let row = players * self.dim;
+        let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
+        tails.into_iter().flatten().chain(self.theta.last()).all(|x| x.is_finite())
+    }
+
     fn push(&mut self, policy: &Policy, k: usize, z: &[f64], attacker: &[f64], network: &Topology, step: &StepPolicy) {
         let dim = self.dim;
         for row in z.chunks_exact(dim) {
