@@ -2,8 +2,8 @@
 
 ``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
 ``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with that digest, the chunk, the number of
-rows and a digest of the rows in its metadata. Every file appears whole: it is written under a temporary name, brought to the
-disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
+rows and a digest of the rows in its metadata. Every file appears whole: it is written under a temporary name, brought
+to the disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
 any number may read.
 """
 

@@ -1,6 +1,6 @@
 """Every fault that a long study meets, done to a real one, and one table of what came of it.
 
-    python tests/faults.py [--kills 50] [--seed 0]
+    python tests/faults [--kills 50] [--seed 0]
 
 Every fault must end in the outcomes of one undisturbed run, to the bit, or in a `StoreError` or `WorkerError` that
 names the place. The script leaves with 1 if one does not. Moments, bits and lengths are drawn from the seed.
@@ -11,150 +11,38 @@ import concurrent.futures as futures
 import multiprocessing
 import os
 import random
-import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "python"))
+sys.path.insert(0, str(Path(__file__).parent))
 
-import pyarrow as pa  # noqa: E402
+from bench import CHUNK, INSIDE, TRIALS, Bench, WrongError, child, insist, ipc, parts, refused, study
 
-import tadcore  # noqa: E402
-from study_cases import CHUNK, parts, study  # noqa: E402
-from tadcore import StoreError, WorkerError  # noqa: E402
-
-TRIALS = 60 * CHUNK + 123
-RUN = """
-import sys
 import tadcore
-from study_cases import study
-print("ready", flush=True)
-try:
-    study({trials}).run(store=sys.argv[1], threads=1)
-except tadcore.StoreError as error:
-    print(error, file=sys.stderr)
-    sys.exit(3)
-"""
-# The process kills itself inside the writing of its second part: at the stage that is given.
-INSIDE = """
-import os, signal, sys
-from pathlib import Path
-stage, calls = sys.argv[2], 0
-def armed(of, name):
-    call = getattr(of, name)
-    def instead(*given, **options):
-        global calls
-        calls += 1
-        if calls == 4:  # the manifest, the first part, then the second (each is synced twice: the file, its folder)
-            os.kill(os.getpid(), signal.SIGKILL)
-        return call(*given, **options)
-    setattr(of, name, instead)
-import tempfile
-of, name = {"create": (tempfile, "mkstemp"), "sync": (os, "fsync"), "rename": (Path, "replace")}[stage]
-armed(of, name)
-"""
-
-
-class Wrong(AssertionError):
-    """What came of a fault is not what was promised."""
-
-
-def insist(holds, words):
-    if not holds:
-        raise Wrong(words)
-
-
-def child(folder, source=None, *more):
-    """A process that runs the study; this returns when it is about to begin."""
-    path = os.pathsep.join([str(Path(tadcore.__file__).parents[1]), str(ROOT / "tests" / "python")])
-    code = (source or "") + RUN.format(trials=TRIALS)
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, folder, *more],
-        env={**os.environ, "PYTHONPATH": path},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    process.stdout.readline()
-    return process
-
-
-def ipc(table):
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, table.schema) as stream:
-        stream.write_table(table.combine_chunks())
-    return sink.getvalue().to_pybytes()
-
-
-class Bench:
-    """One undisturbed run, and stores to be spoiled beside it."""
-
-    def __init__(self, place, kills, rng):
-        self.place, self.kills, self.rng = place, kills, rng
-        began = time.perf_counter()
-        self.whole = study(TRIALS).run(store=place / "whole", threads=1)
-        self.length = time.perf_counter() - began
-        self.bytes, self.parts = ipc(self.whole.table), parts(place / "whole")
-
-    def fresh(self, name, copy=False):
-        folder = self.place / name
-        return Path(shutil.copytree(self.place / "whole", folder)) if copy else folder
-
-    def same(self, folder):
-        """Finish what is in the folder and compare it with the undisturbed run, in memory, read back and on disk."""
-        result = study(TRIALS).run(store=folder, threads=1)
-        insist(ipc(result.table) == self.bytes, "the final table differs")
-        insist(ipc(tadcore.load_study(folder).table) == self.bytes, "the table read back differs")
-        insist(parts(folder) == self.parts, "the parts on disk differ")
-        insist(not list(folder.glob(".*")), "a half-written file was left")
-
-    def killer(self, folder, victim):
-        """Kill a process some time after the next part has appeared."""
-
-        def kill(there=len(parts(folder)), later=self.rng.uniform(0, 0.3)):
-            while len(parts(folder)) <= there:
-                time.sleep(0.005)
-            time.sleep(later)
-            os.kill(victim, signal.SIGKILL)
-
-        thread = threading.Thread(target=kill)
-        thread.start()
-        return thread
-
-    def kept(self, before, folder):
-        """Parts that were finished before a fault and are not there, to the bit, after it."""
-        lost = [name for name, data in before.items() if parts(folder).get(name) != data]
-        insist(not lost, f"finished parts were lost: {lost}")
+from tadcore import StoreError
 
 
 def killed(b):
     folder, before, halves, on_the_way = b.fresh("killed"), {}, 0, 0
-    with child(b.fresh("timed")) as process:  # how long until the first part is there, and from part to part
-        began = time.perf_counter()
-        while len(parts(b.place / "timed")) < 1:
-            time.sleep(0.002)
-        first = time.perf_counter() - began
-        process.wait()
-        each = (time.perf_counter() - began - first) / (len(b.parts) - 1)
-    for left in range(b.kills, 0, -1):
+    for i in range(b.kills):
         with child(folder) as process:
-            # Every fifth while the study begins; the others so that the parts last until the last kill.
-            share = (0.9 * len(b.parts) - len(before)) / left
-            later = 0 if left % 5 == 0 else first + 2 * max(share, 0) * each * b.rng.random()
-            time.sleep(later or first * b.rng.random())
+            # Every fifth while the study begins; the others some time after as many new parts as leave some to the last.
+            share = (len(b.parts) - 5 - len(before)) / (b.kills - i)
+            wanted = len(before) + int(share + b.rng.random()) if i % 5 else 0
+            while len(list(folder.glob("part-*.parquet"))) < wanted and process.poll() is None:
+                time.sleep(0.001)
+            time.sleep(b.rng.uniform(0, b.length / len(b.parts)))
             process.send_signal(signal.SIGKILL)
         on_the_way += process.returncode == -signal.SIGKILL
         b.kept(before, folder)
         before = parts(folder)
         halves += len(list(folder.glob(".*.*")))
     insist(on_the_way >= 0.9 * b.kills, f"only {on_the_way} runs were still going when killed")
-    insist(len(before) > len(b.parts) // 4, f"only {len(before)} parts were written between the kills")
+    insist(len(before) > min(b.kills, len(b.parts)) // 2, f"only {len(before)} parts were written between the kills")
     b.same(folder)
     there = f"{len(before)} of {len(b.parts)} were there after the last kill"
     return b.kills, f"no finished part; {there}; {halves} half-written files seen and removed"
@@ -201,15 +89,6 @@ def disk_full(b):
     finally:
         subprocess.run(["umount", "-l", folder], check=True)
     return 3, "the part that did not fit; then read-only: read, and refused to writers"
-
-
-def refused(call, words):
-    try:
-        call()
-    except (StoreError, WorkerError) as error:
-        insist(words in str(error), f"the error does not say {words!r}: {error}")
-        return str(error)
-    raise Wrong(f"nothing was raised; expected an error that says {words!r}")
 
 
 def read_only(b):
@@ -296,7 +175,7 @@ def pool_worker(b):
             list(pool.map(abs, range(8)))
             victim = b.rng.choice(list(pool._processes))
             killer = b.killer(folder, victim)
-            refused(lambda: study(TRIALS).run(store=folder, executor=pool), "run the study again with this store")  # noqa: B023
+            refused(lambda: study(TRIALS).run(store=folder, executor=pool), "run the study again with this store")
             killer.join()
         b.kept(before, folder)
         done += 1
@@ -345,16 +224,16 @@ def main():
     options = parser.parse_args()
     failed = 0
     with tempfile.TemporaryDirectory(prefix="tadcore-faults-") as name:
-        bench = Bench(Path(name), options.kills, random.Random(options.seed))
-        print(f"a study of {TRIALS:,} trials in {len(bench.parts)} parts, {bench.length:.1f} s undisturbed\n")
+        wanted = Bench(Path(name), options.kills, random.Random(options.seed))
+        print(f"a study of {TRIALS:,} trials in {len(wanted.parts)} parts, {wanted.length:.1f} s undisturbed\n")
         print("| fault | times | what was lost | final table | verdict |\n|---|---|---|---|---|")
         for fault, test in FAULTS.items():
             if options.only not in fault:
                 continue
             try:
-                times, lost = test(bench)
+                times, lost = test(wanted)
                 table, verdict = ("equal to the bit", "ok") if times else ("–", "skipped")
-            except (Wrong, tadcore.TadcoreError, OSError, subprocess.SubprocessError) as error:
+            except (WrongError, tadcore.TadcoreError, OSError, subprocess.SubprocessError) as error:
                 times, lost, table, verdict = "–", str(error), "–", "FAILED"
                 failed += 1
             print(f"| {fault} | {times} | {lost} | {table} | {verdict} |", flush=True)
