@@ -3,8 +3,8 @@
 ``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
 ``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with that digest, the chunk, the number of
 rows and a digest of the rows in its metadata. Every file appears whole: it is written under a temporary name, brought
-to the disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
-any number may read.
+to the disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the
+process; any number may read.
 """
 
 from __future__ import annotations
@@ -133,10 +133,13 @@ class Manifest:
             raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
         except OSError as error:
             raise StoreError(str(path), f"it cannot be read ({_reason(error)})", "check the path") from None
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise StoreError(str(path), f"it is no manifest of a study ({error})", "name another folder") from None
         if manifest.study != content.get("study_sha256"):
             raise StoreError(str(path), "its digest does not fit its content: it was edited", "name another folder")
+        if manifest.chunk != CHUNK:  # what a part may hold at most: a stranger does not decide how much is read
+            found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
+            raise StoreError(str(path), found, "read it with the version that wrote it")
         return manifest
 
 

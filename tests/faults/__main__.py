@@ -30,7 +30,7 @@ def killed(b):
     folder, before, halves, on_the_way = b.fresh("killed"), {}, 0, 0
     for i in range(b.kills):
         with child(folder) as process:
-            # Every fifth while the study begins; the others some time after as many new parts as leave some to the last.
+            # Every fifth while the study begins; the others after as many new parts as leave some to the last.
             share = (len(b.parts) - 5 - len(before)) / (b.kills - i)
             wanted = len(before) + int(share + b.rng.random()) if i % 5 else 0
             while len(list(folder.glob("part-*.parquet"))) < wanted and process.poll() is None:

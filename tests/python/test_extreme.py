@@ -52,7 +52,7 @@ def plays(sc):
     try:
         run = tadcore.simulate(sc)
     except TadcoreError as refusal:
-        with pytest.raises(type(refusal), match="."):
+        with pytest.raises(type(refusal), match=r"."):
             tadcore.simulate_batch(sc, [sc.positions])
         return None
     assert finite(run)

@@ -74,7 +74,6 @@ def test_toml_loses_no_bit(sc):
     assert bits(again) == bits(sc)
     assert again == sc
     assert again.to_toml() == sc.to_toml()
-    assert ()
 
 
 @given(scenarios(), st.integers(0, 2**32 - 1), st.integers(1, 3))

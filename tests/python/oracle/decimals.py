@@ -1,4 +1,4 @@
-"""P(0) of a duel of I2 in decimal numbers of 500 digits: the linear Hamiltonian flow by a Taylor series and squaring."""
+"""P(0) of a duel of I2 to 500 decimal digits: the linear Hamiltonian flow by a Taylor series and squaring."""
 
 import math
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext

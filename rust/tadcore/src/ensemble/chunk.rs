@@ -10,6 +10,7 @@ use super::Batch;
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, sweep_of};
 use crate::cancel::CancelToken;
 use crate::error::RunError;
+use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
 use crate::policy::shelf::Shelf;
@@ -191,11 +192,11 @@ impl<'a> Chunk<'a> {
 
     /// The trials that are left at T: caught in the last instant, or out of time.
     ///
-    /// A state that left the range of double precision can only be here: no number that is none lies within a radius.
+    /// A state that left the range of double precision ends up here: what is no number lies within no radius.
     fn finish(&mut self, last: usize, ends: &mut [End]) -> Result<(), RunError> {
         for place in 0..self.strips.live {
             let trial = self.who[place] as usize;
-            if !self.state(place).iter().all(|x| x.is_finite()) {
+            if !self.state(place).iter().all(|x| x.abs() <= BEYOND) {
                 let time = self.policy.game().grid().horizon();
                 return Err(RunError::Range { trial: Some(self.first + trial), time });
             }

@@ -11,6 +11,8 @@ pub(crate) fn positive(field: &str, value: f64) -> Result<(), GameError> {
 pub(crate) const WEIGHTS: (f64, f64) = (1e-30, 1e30);
 /// The largest coordinate: its square, and a cost, stay within a double.
 pub(crate) const FARTHEST: f64 = 1e100;
+/// How far a player may be driven, and how fast, within a run: beyond it a cost is no double any more.
+pub(crate) const BEYOND: f64 = 1e120;
 /// The most memory that P on the grid and the empty tables may take.
 const MOST_BYTES: u128 = 16 << 30;
 /// What the tables take for each instant before they hold anything, at most.

@@ -4,6 +4,7 @@ use super::outcome::{Outcome, Reach, relative_state};
 use super::setup::Setup;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
+use crate::game::validation::BEYOND;
 use crate::network::{Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
@@ -79,7 +80,7 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
         }
         let step = policy.at(k, &topology, &mut solver);
         record.push(policy, k, &z, &attacker, &topology, &step);
-        if !record.last_row_is_finite(n + 2) {
+        if !record.last_row_is_bounded(n + 2) {
             return Err(RunError::Range { trial: None, time: game.grid().time(k) });
         }
         if let Some(outcome) = end {
@@ -115,10 +116,10 @@ pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
 }
 
 impl Record {
-    fn last_row_is_finite(&self, players: usize) -> bool {
+    fn last_row_is_bounded(&self, players: usize) -> bool {
         let row = players * self.dim;
         let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
-        tails.into_iter().flatten().chain(self.theta.last()).all(|x| x.is_finite())
+        tails.into_iter().flatten().all(|x| x.abs() <= BEYOND) && self.theta.last().is_some_and(|x| x.is_finite())
     }
 
     fn push(&mut self, policy: &Policy, k: usize, z: &[f64], attacker: &[f64], network: &Topology, step: &StepPolicy) {
