@@ -27,24 +27,27 @@ struct Input {
     reach: [Number; 6],
 }
 
-/// A number of ordinary size, one of any decade, or any double at all: infinities, subnormals and NaN among them.
+/// Mostly a number of ordinary size, so that the fuzzer gets past the checks; one of any decade; or any double at all,
+/// infinities, subnormals and NaN among them.
 #[derive(Debug, Arbitrary, Clone, Copy)]
-enum Number {
-    Small(i16),
-    Decade(i8, u8),
-    Any(f64),
+struct Number {
+    kind: u8,
+    small: i16,
+    power: i8,
+    any: f64,
 }
 
 impl Number {
     fn signed(self) -> f64 {
-        match self {
-            Self::Small(x) => f64::from(x) / 8192.0,
-            Self::Decade(power, digits) => 10f64.powi(i32::from(power) % 40) * (1.0 + f64::from(digits) / 32.0),
-            Self::Any(x) => x,
+        let small = f64::from(self.small) / 8192.0;
+        match self.kind {
+            0..4 => self.any,
+            4..32 => small * 10f64.powi(i32::from(self.power) % 32),
+            _ => small,
         }
     }
 
-    /// Mostly valid, so that the fuzzer gets past the checks; what is no number stays none.
+    /// Without its sign; what is no number stays none.
     fn positive(self) -> f64 {
         self.signed().abs()
     }
@@ -70,10 +73,10 @@ fuzz_target!(|input: Input| {
         f_atau: single(3),
         q_taua: single(4),
         f_taua: single(5),
-        lambda: input.lambda.positive(),
-        gamma: input.gamma[..interaction.terms()].iter().map(|g| g.positive()).collect(),
+        lambda: input.lambda.positive() / 4.0,
+        gamma: input.gamma[..interaction.terms()].iter().map(|g| g.positive() / 4.0).collect(),
     };
-    let step = input.step.positive();
+    let step = input.step.positive() / 40.0;
     let Ok(game) = Grid::new(step * steps as f64, step).and_then(|grid| Game::new(interaction, weights, grid)) else {
         return;
     };
