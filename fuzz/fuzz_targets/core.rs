@@ -41,8 +41,8 @@ impl Number {
     fn signed(self) -> f64 {
         let small = f64::from(self.small) / 8192.0;
         match self.kind {
-            0..4 => self.any,
-            4..32 => small * 10f64.powi(i32::from(self.power) % 32),
+            0 => self.any,
+            1..6 => small * 10f64.powi(i32::from(self.power) % 32),
             _ => small,
         }
     }
