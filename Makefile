@@ -10,7 +10,7 @@ STAMP  := $(VENV)/.installed
 RUST   := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format bench peers docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python heavy faults fuzz audit lint format bench peers docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -37,6 +37,24 @@ test-rust:
 test-python: $(STAMP)
 	$(BIN)/python -m pytest
 	$(BIN)/python -m mypy.stubtest tadcore._core
+
+heavy: $(STAMP)  ## the tests that take minutes or gigabytes: a million steps, forty defenders of limited sight
+	$(BIN)/python -m pytest -m heavy
+
+faults: $(STAMP)  ## kill, fill, damage and share a real study; one table of what came of it
+	$(BIN)/python -W ignore tests/faults
+
+# Any compiler will do: the switch lets a stable one count coverage. FUZZ_SECONDS is for each of the three targets.
+FUZZ_SECONDS ?= 20
+fuzz: $(STAMP)  ## hostile bytes for the core, the saved table and the readers of files, 60 s in all (needs cargo-fuzz)
+	cd fuzz && for target in core table; do \
+	  mkdir -p corpus/$$target && RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target corpus/$$target seeds/$$target -- \
+	    -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=2048 || exit 1; done
+	$(BIN)/python -m pip install --quiet atheris
+	$(BIN)/python fuzz/scenario.py fuzz/corpus/scenario -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=6000
+
+audit: $(STAMP)  ## licences and sources of all that is used; known vulnerabilities where a database can be reached
+	$(BIN)/python tests/audit.py
 
 lint: $(STAMP)  ## format check, clippy, rustdoc, ruff, mypy: warnings are errors
 	cargo fmt --all --check

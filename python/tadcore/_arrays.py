@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._fields import FARTHEST
 from .errors import ScenarioError
 
 _LISTED = 20
@@ -45,6 +46,7 @@ def as_positions(values: ArrayLike, shape: tuple[int, ...], *, rows: bool = Fals
     if array.shape[rows:] != shape or array.ndim != len(shape) + rows:
         raise ScenarioError("positions", f"shape {array.shape}", rule)
     refuse_where("positions", array, ~np.isfinite(array), "a finite number")
+    refuse_where("positions", array, np.abs(array) > FARTHEST, "a coordinate between -1e100 and 1e100")
     return array
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._design import CHUNK, Design, generator, unit_points
+from ._fields import FARTHEST
 from ._vary import Quantity, quantities, setups
 from .batch import simulate_batch
 from .errors import ScenarioError
@@ -84,6 +85,9 @@ class Plan:
                 else:
                     good, rule = values > 0.0, "a positive number, or inf"
                 self._refuse(chunk, quantity.columns[part], values, ~good, rule)
+                if quantity.field == "position":
+                    rule = "a coordinate between -1e100 and 1e100"
+                    self._refuse(chunk, quantity.columns[part], values, np.abs(values) > FARTHEST, rule)
                 column += 1
         _, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):

@@ -65,10 +65,24 @@ def _kind(rule: str, holds: Callable[[float], bool]) -> Callable[[object], float
     return check
 
 
+LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
+"""Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
+
 is_positive = _kind("a positive finite number", lambda v: v > 0.0 and math.isfinite(v))
+_is_bounded_weight = _kind("a weight between 1e-30 and 1e30", lambda v: LIGHTEST <= v <= HEAVIEST)
+_is_near = _kind("a coordinate between -1e100 and 1e100", lambda v: abs(v) <= FARTHEST)
 is_radius = _kind("a positive number, or inf for unlimited sight", lambda v: v > 0.0)
 is_fraction = _kind("a number in [0, 1]", lambda v: 0.0 <= v <= 1.0)
 _is_finite = _kind("a finite number", math.isfinite)
+
+
+def is_weight(value: object) -> float:
+    """A positive finite number within the bounds of weights."""
+    return _is_bounded_weight(is_positive(value))
+
+
+def _is_coordinate(value: object) -> float:
+    return _is_near(_is_finite(value))
 
 
 def _sequence(value: object, rule: str) -> list[Any]:
@@ -100,7 +114,7 @@ def is_position(value: object) -> tuple[float, ...]:
     values = _sequence(value, rule)
     if len(values) not in (2, 3):
         raise refuse(value, rule)
-    return _each(values, _is_finite)
+    return _each(values, _is_coordinate)
 
 
 def is_gamma(value: object) -> tuple[float, ...]:
@@ -124,6 +138,7 @@ def is_team(value: object) -> object:
 
 
 Positive = Annotated[float, Field(gt=0.0), BeforeValidator(is_positive)]
+Weight = Annotated[float, Field(ge=LIGHTEST, le=HEAVIEST), BeforeValidator(is_weight)]
 Radius = Annotated[float, Field(gt=0.0), BeforeValidator(is_radius)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0), BeforeValidator(is_fraction)]
 Position = Annotated[tuple[float, ...], Field(min_length=2, max_length=3), BeforeValidator(is_position)]

@@ -15,6 +15,7 @@ The bytes of a part depend on its rows and its study alone: the settings of the 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,7 +25,7 @@ import pyarrow.parquet as pq
 from ._chunks import Outcomes
 from ._design import CHUNK
 
-__all__ = ["FIXED", "encoded", "schema_of", "table_of"]
+__all__ = ["FIXED", "digest", "encoded", "schema_of", "table_of"]
 
 FIXED = {"trial": pa.int64(), "kind": pa.int8(), "defender": pa.int32(), "time": pa.float64()}
 
@@ -42,6 +43,17 @@ def table_of(chunk: int, outcomes: Outcomes, schema: pa.Schema) -> pa.Table:
     inputs = np.ascontiguousarray(outcomes.inputs.T)
     arrays = [trial, outcomes.kind, outcomes.defender, outcomes.time, *inputs]
     return pa.Table.from_arrays([pa.array(array) for array in arrays], schema=schema)
+
+
+def digest(table: pa.Table) -> str:
+    """SHA-256 of every number of a table, column after column.
+
+    The checksums of Parquet cover its pages alone: a bit that flips in the footer can make whole pages read as others.
+    """
+    total = hashlib.sha256()
+    for column in table.columns:
+        total.update(column.to_numpy().tobytes())
+    return total.hexdigest()
 
 
 def encoded(table: pa.Table, metadata: dict[str, str]) -> bytes:

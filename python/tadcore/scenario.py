@@ -32,7 +32,7 @@ import tomli_w
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from ._fields import Fraction, Gamma, Position, Positive, Problem, Radius, is_team, refusal
+from ._fields import Fraction, Gamma, Position, Positive, Problem, Radius, Weight, is_team, refusal
 from ._files import parse_toml, read_text, write_whole
 from ._model import CheckedModel
 
@@ -56,10 +56,10 @@ class Attacker(CheckedModel):
     _belongs: ClassVar[dict[str, str]] = {"evasion": "I1"}
 
     position: Position = Field(description="X_a(0), the initial position, 2 or 3 finite numbers")
-    control_weight: Positive = Field(description="r_a, the cost of effort")
+    control_weight: Weight = Field(description="r_a, the cost of effort")
     capture_radius: Positive = Field(description="σ_a, within which it captures the target")
-    target_running_weight: Positive = Field(default=1.0, description="q_aτ, weight on the distance to the target")
-    target_terminal_weight: Positive = Field(default=1.0, description="f_aτ, the same at T")
+    target_running_weight: Weight = Field(default=1.0, description="q_aτ, weight on the distance to the target")
+    target_terminal_weight: Weight = Field(default=1.0, description="f_aτ, the same at T")
     evasion: Fraction = Field(default=1.0, description="λ: 0 suicidal, 1 evading (I1 only)")
 
 
@@ -74,9 +74,9 @@ class Target(CheckedModel):
     }
 
     position: Position = Field(description="X_τ(0), the initial position, 2 or 3 finite numbers")
-    control_weight: Positive = Field(description="r_τ, the cost of effort")
-    running_weight: Positive = Field(default=1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
-    terminal_weight: Positive = Field(default=1.0, description="f_τa, the same at T (I1 only)")
+    control_weight: Weight = Field(description="r_τ, the cost of effort")
+    running_weight: Weight = Field(default=1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
+    terminal_weight: Weight = Field(default=1.0, description="f_τa, the same at T (I1 only)")
     visibility_radius: Radius = Field(default=math.inf, description="ζ_τ, how far it sees; inf for unlimited (I2 only)")
 
 
@@ -87,13 +87,13 @@ class Defender(CheckedModel):
     _belongs: ClassVar[dict[str, str]] = {"running_weight": "I1", "terminal_weight": "I1"}
 
     position: Position = Field(description="X_d(0), the initial position, 2 or 3 finite numbers")
-    control_weight: Positive = Field(description="r_d, the cost of effort")
+    control_weight: Weight = Field(description="r_d, the cost of effort")
     capture_radius: Positive = Field(description="σ_d, within which it intercepts the attacker")
     visibility_radius: Radius = Field(default=math.inf, description="ζ_d, how far it sees; inf for unlimited")
-    running_weight: Positive = Field(default=1.0, description="q_da, weight on the distance to the attacker (I1 only)")
-    terminal_weight: Positive = Field(default=1.0, description="f_da, the same at T (I1 only)")
-    evasion_running_weight: Positive = Field(default=1.0, description="q_ad, the attacker's weight on evading it")
-    evasion_terminal_weight: Positive = Field(default=1.0, description="f_ad, the same at T")
+    running_weight: Weight = Field(default=1.0, description="q_da, weight on the distance to the attacker (I1 only)")
+    terminal_weight: Weight = Field(default=1.0, description="f_da, the same at T (I1 only)")
+    evasion_running_weight: Weight = Field(default=1.0, description="q_ad, the attacker's weight on evading it")
+    evasion_terminal_weight: Weight = Field(default=1.0, description="f_ad, the same at T")
 
 
 class Scenario(CheckedModel):

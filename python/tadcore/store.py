@@ -1,10 +1,10 @@
 """A study on disk: a folder of Parquet parts, one for each finished chunk, and a manifest that says whose they are.
 
 ``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
-``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with the digest, the chunk and the number of
-rows in its metadata. Every file appears whole: it is written under a temporary name, brought to the
-disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the process;
-any number may read.
+``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with that digest, the chunk, the number of
+rows and a digest of the rows in its metadata. Every file appears whole: it is written under a temporary name, brought
+to the disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the
+process; any number may read.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from . import _core
 from ._design import CHUNK, STREAM
 from ._files import write_whole
 from ._samplers import as_plain, from_plain
-from ._table import encoded
+from ._table import digest, encoded
 from .errors import StoreError
 
 __all__ = ["FORMAT", "Manifest", "Store"]
@@ -133,10 +133,13 @@ class Manifest:
             raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
         except OSError as error:
             raise StoreError(str(path), f"it cannot be read ({_reason(error)})", "check the path") from None
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise StoreError(str(path), f"it is no manifest of a study ({error})", "name another folder") from None
         if manifest.study != content.get("study_sha256"):
             raise StoreError(str(path), "its digest does not fit its content: it was edited", "name another folder")
+        if manifest.chunk != CHUNK:  # what a part may hold at most: a stranger does not decide how much is read
+            found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
+            raise StoreError(str(path), found, "read it with the version that wrote it")
         return manifest
 
 
@@ -184,15 +187,20 @@ class Store:
         path = self._part(chunk)
         try:
             table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
-        except (OSError, pa.ArrowException) as error:
+            said = (table.schema.metadata or {}).get(b"tadcore_sha256", b"").decode()
+            table = table.cast(self.schema)
+            whole = len(table) == self.rows[chunk] and digest(table) == said
+        except (OSError, ValueError, pa.ArrowException) as error:
             raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
-        return table.cast(self.schema)
+        if not whole:
+            raise StoreError(str(path), "it is damaged (its rows are not those that were written)", _AGAIN)
+        return table
 
     def write(self, chunk: int, table: pa.Table) -> None:
         """Keep the outcomes of a chunk; they are on the disk when this returns."""
         rows = len(table)
-        about = {"tadcore_study": self.manifest.study, "tadcore_chunk": str(chunk), "tadcore_rows": str(rows)}
-        _write(self._part(chunk), encoded(table, about))
+        said = {"study": self.manifest.study, "chunk": str(chunk), "rows": str(rows), "sha256": digest(table)}
+        _write(self._part(chunk), encoded(table, {f"tadcore_{key}": value for key, value in said.items()}))
         self.rows[chunk] = rows
 
     def stop(self, trials: int | None) -> None:
@@ -221,9 +229,10 @@ class Store:
             with pq.ParquetFile(path) as part:
                 about = part.metadata.metadata or {}
                 rows, schema = part.metadata.num_rows, part.schema_arrow
-        except (OSError, pa.ArrowException) as error:
+                said = {key: about.get(f"tadcore_{key}".encode(), b"").decode() for key in ("study", "chunk", "rows")}
+                named = schema.names == self.schema.names
+        except (OSError, ValueError, pa.ArrowException) as error:
             raise StoreError(str(path), f"it is truncated or no Parquet file ({error})", _AGAIN) from None
-        said = {key: about.get(f"tadcore_{key}".encode(), b"").decode() for key in ("study", "chunk", "rows")}
         if said["study"] != self.manifest.study:
             found = "another study" if said["study"] else "no study"
             raise StoreError(str(path), f"it belongs to {found}", "move it out of this folder, or name another store")
@@ -231,7 +240,7 @@ class Store:
             raise StoreError(str(path), f"it holds chunk {said['chunk']}, not {chunk}", "give it its name back")
         if said["rows"] != str(rows) or not 0 < rows <= self.manifest.chunk:
             raise StoreError(str(path), f"it has {rows} rows, and says {said['rows']}", _AGAIN)
-        if not schema.remove_metadata().equals(self.schema):
+        if not named or not schema.remove_metadata().equals(self.schema):
             raise StoreError(str(path), f"its columns are {schema.names}, not {self.schema.names}", _AGAIN)
         return int(rows)
 

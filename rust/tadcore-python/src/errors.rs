@@ -21,6 +21,11 @@ pub(crate) fn game(py: Python<'_>, error: GameError) -> PyErr {
         GameError::Length { field, found, expected } => {
             raise(py, "ScenarioError", (field, format!("{found} entries"), format!("of {expected} entries")))
         }
+        GameError::Size { players, steps, gib } => {
+            let rule =
+                "such that P at all instants fits into 16 GiB: a larger step, a shorter horizon, fewer defenders";
+            raise(py, "ScenarioError", ("step", format!("{steps} steps of {players} players, {gib} GiB"), rule))
+        }
         GameError::Grid { horizon, step } => {
             let rule = format!("a divisor of the horizon {horizon}");
             raise(py, "ScenarioError", ("step", step, rule))
@@ -34,7 +39,9 @@ pub(crate) fn equilibrium(py: Python<'_>, game: &Game, error: &EquilibriumError)
         EquilibriumError::FiniteEscape { escape_time, horizon } => {
             raise(py, "NoEquilibriumError", (*escape_time, *horizon, game.grid().step()))
         }
-        EquilibriumError::StepBudget { .. } => raise(py, "TadcoreError", (error.to_string(),)),
+        EquilibriumError::StepBudget { .. } | EquilibriumError::Range | EquilibriumError::Memory { .. } => {
+            raise(py, "TadcoreError", (error.to_string(),))
+        }
         EquilibriumError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),
     }
 }
@@ -44,6 +51,7 @@ pub(crate) fn run(py: Python<'_>, of: &Game, error: RunError) -> PyErr {
     match error {
         RunError::Game(error) => game(py, error),
         RunError::Equilibrium(error) => equilibrium(py, of, &error),
+        RunError::Range { .. } => raise(py, "TadcoreError", (error.to_string(),)),
         RunError::Threads(threads) => raise(py, "ScenarioError", ("threads", threads, "a number the system can start")),
         RunError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),
     }

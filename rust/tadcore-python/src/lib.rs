@@ -1,4 +1,6 @@
-//! Bindings: convert, call, convert. Nothing is computed here.
+//! Bindings: convert, call, convert. Nothing is computed here, and nothing here may end the interpreter.
+
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod arrays;
 mod detach;

@@ -28,6 +28,16 @@ pub enum GameError {
         /// Entries needed.
         expected: usize,
     },
+    /// P on the grid would not fit into memory.
+    #[error("P of {players} players at {steps} steps needs {gib} GiB, more than the limit of 16 GiB")]
+    Size {
+        /// N.
+        players: usize,
+        /// K.
+        steps: usize,
+        /// Whole gibibytes needed.
+        gib: u64,
+    },
     /// The step does not divide the horizon.
     #[error("step is {step}, but it must divide the horizon {horizon} into a whole number of steps")]
     Grid {
@@ -54,7 +64,7 @@ pub enum EquilibriumError {
         horizon: f64,
     },
     /// The integrator used up its budget of steps.
-    #[error("the Riccati integrator took {steps} steps and came only {reached} of {horizon} back from the horizon")]
+    #[error("the Riccati integrator took {steps} steps and came only {reached:?} of {horizon:?} back from the horizon")]
     StepBudget {
         /// Steps taken.
         steps: usize,
@@ -62,6 +72,15 @@ pub enum EquilibriumError {
         reached: f64,
         /// T.
         horizon: f64,
+    },
+    /// The solution left the range of double precision.
+    #[error("the Riccati solution leaves the range of double precision: the weights lie too far apart")]
+    Range,
+    /// The system gave no memory.
+    #[error("the system gave no {bytes} bytes for P on the grid: a larger step or a shorter horizon needs less")]
+    Memory {
+        /// Bytes asked for.
+        bytes: usize,
     },
     /// The caller asked to stop.
     #[error(transparent)]
@@ -104,6 +123,17 @@ pub enum RunError {
     /// No equilibrium.
     #[error(transparent)]
     Equilibrium(#[from] EquilibriumError),
+    /// A state left the range of double precision.
+    #[error(
+        "{}the game leaves the range of double precision by t = {time}: its feedback drives a player beyond all bounds",
+        trial.map_or_else(String::new, |i| format!("trial {i}: "))
+    )]
+    Range {
+        /// Which game of a batch.
+        trial: Option<usize>,
+        /// The instant at which it was noticed.
+        time: f64,
+    },
     /// The system gave no threads.
     #[error("threads is {0}, but the system would not start that many")]
     Threads(usize),

@@ -50,9 +50,12 @@ macro_rules! widened {
             }
             match width {
                 $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
-                // SAFETY: these variants exist only where the processor said that it has AVX2.
                 #[cfg(target_arch = "x86_64")]
-                $crate::width::Width::Avx2 | $crate::width::Width::Avx512 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
+                $crate::width::Width::Avx2 | $crate::width::Width::Avx512 => {
+                    debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
+                    // SAFETY: these variants exist only where the processor said that it has AVX2.
+                    unsafe { avx2 $(::<$($g),*>)? ($($arg),*) }
+                }
             }
         }
     };

@@ -9,6 +9,7 @@ module         what it computes
 model          weights, the paper's B, S, Q, F; the eight runs of section 6
 riccati        eq:Riccati and eq:RDE in full, the Hamiltonian closed form, the escape time of I2
 escape         escape times of I1 in extended precision
+decimals       P of a duel of I2 to hundreds of digits
 network        Ad, Phi, A and I_i in full
 theta          Theta_1, Theta_2, their terms and the printed gradients in 2 x 2 blocks
 search         a trust-region Newton method in real or complex gains

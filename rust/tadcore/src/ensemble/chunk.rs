@@ -9,7 +9,8 @@ use std::sync::RwLockReadGuard;
 use super::Batch;
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, sweep_of};
 use crate::cancel::CancelToken;
-use crate::error::Cancelled;
+use crate::error::RunError;
+use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
 use crate::policy::shelf::Shelf;
@@ -80,7 +81,7 @@ impl<'a> Chunk<'a> {
     }
 
     /// Plays every trial to its end.
-    pub(super) fn play(&mut self, ends: &mut [End], w: &mut Worker, cancel: &CancelToken) -> Result<(), Cancelled> {
+    pub(super) fn play(&mut self, ends: &mut [End], w: &mut Worker, cancel: &CancelToken) -> Result<(), RunError> {
         let transitions = self.policy.transitions();
         let last = self.policy.game().grid().steps();
         let (mut lookups, mut misses) = (0, 0);
@@ -102,8 +103,7 @@ impl<'a> Chunk<'a> {
             }
         }
         transitions.count(lookups.max(misses), misses);
-        self.finish(last, ends);
-        Ok(())
+        self.finish(last, ends)
     }
 
     /// Moves every strip that can move, and lists those that wait with the topologies they miss.
@@ -191,10 +191,18 @@ impl<'a> Chunk<'a> {
     }
 
     /// The trials that are left at T: caught in the last instant, or out of time.
-    fn finish(&mut self, last: usize, ends: &mut [End]) {
+    ///
+    /// A state that left the range of double precision ends up here: what is no number lies within no radius.
+    fn finish(&mut self, last: usize, ends: &mut [End]) -> Result<(), RunError> {
         for place in 0..self.strips.live {
-            ends[self.who[place] as usize] = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
+            let trial = self.who[place] as usize;
+            if !self.state(place).iter().all(|x| x.abs() <= BEYOND) {
+                let time = self.policy.game().grid().horizon();
+                return Err(RunError::Range { trial: Some(self.first + trial), time });
+            }
+            ends[trial] = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
         }
+        Ok(())
     }
 }
 

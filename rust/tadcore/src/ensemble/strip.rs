@@ -306,8 +306,11 @@ fn sized<const N: usize, const M: usize, const D: usize, const Q: usize>(width: 
             ) -> Stop {
                 sweep::<Wide256, N, M, D, Q>(strips, from, shelf, keys)
             }
-            // SAFETY: this width exists only where the processor said that it has AVX2.
-            |_, strips, from, shelf, keys| unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+            |_, strips, from, shelf, keys| {
+                debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
+                // SAFETY: this width exists only where the processor said that it has AVX2.
+                unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+            }
         }
         #[cfg(target_arch = "x86_64")]
         Width::Avx512 => {
@@ -320,8 +323,11 @@ fn sized<const N: usize, const M: usize, const D: usize, const Q: usize>(width: 
             ) -> Stop {
                 sweep::<Wide512, N, M, D, Q>(strips, from, shelf, keys)
             }
-            // SAFETY: this width exists only where the processor said that it has AVX2 and AVX-512F.
-            |_, strips, from, shelf, keys| unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+            |_, strips, from, shelf, keys| {
+                debug_assert!(std::arch::is_x86_feature_detected!("avx512f"));
+                // SAFETY: this width exists only where the processor said that it has AVX2 and AVX-512F.
+                unsafe { wide::<N, M, D, Q>(strips, from, shelf, keys) }
+            }
         }
     }
 }

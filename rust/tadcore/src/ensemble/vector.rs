@@ -102,8 +102,9 @@ pub(super) use x86::{Wide256, Wide512};
 
 /// The registers of x86-64 processors.
 ///
-/// SAFETY of every block below: the methods are called only from functions compiled for the instructions they use, which
-/// run only where the processor has them; memory is read and written through references of the right length.
+/// The methods are called only from functions compiled for the instructions they use, which run only where the processor
+/// has them (asserted there in debug builds); memory is read and written through references to arrays whose type says
+/// how long they are.
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::*;
@@ -115,18 +116,22 @@ mod x86 {
         () => {
             #[inline(always)]
             fn load4(from: &[f64; 4]) -> __m256d {
+                // SAFETY: the caller is compiled for this width; reads the 4 numbers of the array.
                 unsafe { _mm256_loadu_pd(from.as_ptr()) }
             }
             #[inline(always)]
             fn scale4(column: __m256d, by: f64) -> __m256d {
+                // SAFETY: the caller is compiled for this width; registers alone.
                 unsafe { _mm256_mul_pd(column, _mm256_set1_pd(by)) }
             }
             #[inline(always)]
             fn add_scaled4(sum: __m256d, column: __m256d, by: f64) -> __m256d {
+                // SAFETY: the caller is compiled for this width; registers alone.
                 unsafe { _mm256_add_pd(sum, _mm256_mul_pd(column, _mm256_set1_pd(by))) }
             }
             #[inline(always)]
             fn transpose4([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+                // SAFETY: the caller is compiled for this width; registers alone.
                 unsafe {
                     let (ab0, ab1) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
                     let (cd0, cd1) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
@@ -140,6 +145,7 @@ mod x86 {
             }
             #[inline(always)]
             fn store4(x: __m256d, to: &mut [f64; 4]) {
+                // SAFETY: the caller is compiled for this width; writes the 4 numbers of the array.
                 unsafe { _mm256_storeu_pd(to.as_mut_ptr(), x) }
             }
         };
@@ -156,22 +162,27 @@ mod x86 {
 
         #[inline(always)]
         fn load(from: &[f64; 8]) -> Self::Eight {
+            // SAFETY: the caller is compiled for this width; reads the 8 numbers of the array.
             unsafe { [_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))] }
         }
         #[inline(always)]
         fn add(a: Self::Eight, b: Self::Eight) -> Self::Eight {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
         }
         #[inline(always)]
         fn sub(a: Self::Eight, b: Self::Eight) -> Self::Eight {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
         }
         #[inline(always)]
         fn mul(a: Self::Eight, b: Self::Eight) -> Self::Eight {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
         }
         #[inline(always)]
         fn within(a: Self::Eight, b: Self::Eight) -> u8 {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe {
                 let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[0], b[0]));
                 let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a[1], b[1]));
@@ -180,10 +191,12 @@ mod x86 {
         }
         #[inline(always)]
         fn no_keys() -> Self::Keys {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { [_mm256_setzero_si256(); 2] }
         }
         #[inline(always)]
         fn see(keys: Self::Keys, bit: u64, a: Self::Eight, b: Self::Eight) -> Self::Keys {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe {
                 let bit = _mm256_set1_epi64x(bit as i64);
                 let low = _mm256_castpd_si256(_mm256_cmp_pd::<_CMP_LE_OQ>(a[0], b[0]));
@@ -197,6 +210,7 @@ mod x86 {
         #[inline(always)]
         fn keys(keys: Self::Keys) -> [u64; 8] {
             let mut out = [0; 8];
+            // SAFETY: the caller is compiled for this width; writes the 8 words of `out`.
             unsafe {
                 _mm256_storeu_si256(out.as_mut_ptr().cast(), keys[0]);
                 _mm256_storeu_si256(out.as_mut_ptr().add(4).cast(), keys[1]);
@@ -217,30 +231,37 @@ mod x86 {
 
         #[inline(always)]
         fn load(from: &[f64; 8]) -> __m512d {
+            // SAFETY: the caller is compiled for this width; reads the 8 numbers of the array.
             unsafe { _mm512_loadu_pd(from.as_ptr()) }
         }
         #[inline(always)]
         fn add(a: __m512d, b: __m512d) -> __m512d {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { _mm512_add_pd(a, b) }
         }
         #[inline(always)]
         fn sub(a: __m512d, b: __m512d) -> __m512d {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { _mm512_sub_pd(a, b) }
         }
         #[inline(always)]
         fn mul(a: __m512d, b: __m512d) -> __m512d {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { _mm512_mul_pd(a, b) }
         }
         #[inline(always)]
         fn within(a: __m512d, b: __m512d) -> u8 {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b) }
         }
         #[inline(always)]
         fn no_keys() -> __m512i {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe { _mm512_setzero_si512() }
         }
         #[inline(always)]
         fn see(keys: __m512i, bit: u64, a: __m512d, b: __m512d) -> __m512i {
+            // SAFETY: the caller is compiled for this width; registers alone.
             unsafe {
                 let seen = _mm512_cmp_pd_mask::<_CMP_LE_OQ>(a, b);
                 _mm512_mask_or_epi64(keys, seen, keys, _mm512_set1_epi64(bit as i64))
@@ -249,6 +270,7 @@ mod x86 {
         #[inline(always)]
         fn keys(keys: __m512i) -> [u64; 8] {
             let mut out = [0; 8];
+            // SAFETY: the caller is compiled for this width; writes the 8 words of `out`.
             unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), keys) };
             out
         }

@@ -91,6 +91,7 @@ impl Game {
     /// [`GameError`] naming the first field that breaks its rule.
     pub fn new(interaction: Interaction, weights: Weights, grid: Grid) -> Result<Self, GameError> {
         validation::weights(interaction, weights.r_d.len(), &weights)?;
+        validation::size(interaction, weights.r_d.len(), grid.steps())?;
         Ok(Self { interaction, weights, grid })
     }
 

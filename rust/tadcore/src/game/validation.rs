@@ -7,6 +7,30 @@ pub(crate) fn positive(field: &str, value: f64) -> Result<(), GameError> {
     rule(field, value, value > 0.0 && value.is_finite(), "a positive finite number")
 }
 
+/// What a weight may be: far beyond any game, and such that Θ, of the order of (P²/r)², stays within a double.
+pub(crate) const WEIGHTS: (f64, f64) = (1e-30, 1e30);
+/// The largest coordinate: its square, and a cost, stay within a double.
+pub(crate) const FARTHEST: f64 = 1e100;
+/// How far a player may be driven, and how fast, within a run: beyond it a cost is no double any more.
+pub(crate) const BEYOND: f64 = 1e120;
+/// The most memory that P on the grid and the empty tables may take.
+const MOST_BYTES: u128 = 16 << 30;
+/// What the tables take for each instant before they hold anything, at most.
+const TABLE_BYTES: u128 = 512;
+
+fn weight(field: &str, value: f64) -> Result<(), GameError> {
+    positive(field, value)?;
+    rule(field, value, (WEIGHTS.0..=WEIGHTS.1).contains(&value), "between 1e-30 and 1e30")
+}
+
+/// Refuses a game whose equilibrium would not fit into [`MOST_BYTES`], before anything is allocated.
+pub(crate) fn size(interaction: Interaction, n: usize, steps: usize) -> Result<(), GameError> {
+    let groups = if interaction == Interaction::I1 { 3 } else { 1 };
+    let (players, instants) = (n as u128 + 1, steps as u128 + 1);
+    let bytes = instants * (8 * groups * players * players + TABLE_BYTES);
+    if bytes > MOST_BYTES { Err(GameError::Size { players: n + 1, steps, gib: (bytes >> 30) as u64 }) } else { Ok(()) }
+}
+
 fn unit(field: &str, value: f64) -> Result<(), GameError> {
     rule(field, value, (0.0..=1.0).contains(&value), "in [0, 1]")
 }
@@ -29,16 +53,16 @@ pub(crate) fn weights(interaction: Interaction, n: usize, w: &Weights) -> Result
     for &(field, values) in both.iter().chain(with_own) {
         length(field, values.len(), n)?;
         for (i, &v) in values.iter().enumerate() {
-            positive(&format!("defenders[{i}].{field}"), v)?;
+            weight(&format!("defenders[{i}].{field}"), v)?;
         }
     }
-    positive("target.control_weight", w.r_tau)?;
-    positive("attacker.control_weight", w.r_a)?;
-    positive("attacker.target_running_weight", w.q_atau)?;
-    positive("attacker.target_terminal_weight", w.f_atau)?;
+    weight("target.control_weight", w.r_tau)?;
+    weight("attacker.control_weight", w.r_a)?;
+    weight("attacker.target_running_weight", w.q_atau)?;
+    weight("attacker.target_terminal_weight", w.f_atau)?;
     if interaction == Interaction::I1 {
-        positive("target.running_weight", w.q_taua)?;
-        positive("target.terminal_weight", w.f_taua)?;
+        weight("target.running_weight", w.q_taua)?;
+        weight("target.terminal_weight", w.f_taua)?;
         unit("attacker.evasion", w.lambda)?;
     }
     length("synthesis_weights", w.gamma.len(), interaction.terms())?;

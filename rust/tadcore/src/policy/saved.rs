@@ -118,7 +118,18 @@ impl Policy {
         let (rows, mut key) = (padded(size), vec![0; self.words()]);
         let mut matrix = vec![0.0; size * rows];
         let entries = bytes[HEADER..bytes.len() - 8].chunks_exact(self.entry_len());
-        if entries.clone().any(|entry| Reader(entry).u64() >= steps as u64) {
+        // The checksum tells an accident, not an intention: what is read must be an entry of this table.
+        let bits = (self.game.constrained() * size) % 64;
+        let beyond = if bits == 0 { 0 } else { u64::MAX << bits };
+        let valid = |entry: &[u8]| {
+            let mut reader = Reader(entry);
+            let step = reader.u64();
+            let last = (0..self.words()).map(|_| reader.u64()).last().unwrap_or(0);
+            step < steps as u64
+                && last & beyond == 0
+                && (0..size * size).all(|_| f64::from_bits(reader.u64()).is_finite())
+        };
+        if !entries.clone().all(valid) {
             return Err(TableError::Damaged);
         }
         for entry in entries {

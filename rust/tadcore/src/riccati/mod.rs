@@ -50,14 +50,22 @@ pub struct Equilibrium {
 ///
 /// # Errors
 /// [`EquilibriumError::FiniteEscape`] when the solution escapes at or before the horizon,
-/// [`EquilibriumError::StepBudget`] when a game is too stiff, [`EquilibriumError::Cancelled`] when `cancel` was raised.
+/// [`EquilibriumError::StepBudget`] when a game is too stiff, [`EquilibriumError::Range`] and [`EquilibriumError::Memory`]
+/// when its numbers or its grid are too large, [`EquilibriumError::Cancelled`] when `cancel` was raised.
 pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, EquilibriumError> {
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
-    let mut nodes = vec![0.0; (steps + 1) * groups(interaction) * size * size];
+    let numbers = (steps + 1) * groups(interaction) * size * size;
+    let mut nodes = Vec::new();
+    // A refusal, where a plain allocation would end the process.
+    nodes.try_reserve_exact(numbers).map_err(|_| EquilibriumError::Memory { bytes: numbers * size_of::<f64>() })?;
+    nodes.resize(numbers, 0.0);
     let integrator_steps = match interaction {
         Interaction::I1 => coupled::solve(game, cancel, &mut nodes)?,
         Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,
     };
+    if !nodes.iter().all(|p| p.is_finite()) {
+        return Err(EquilibriumError::Range);
+    }
     Ok(Equilibrium { interaction, size, steps, integrator_steps, nodes })
 }
 

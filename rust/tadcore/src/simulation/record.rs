@@ -4,6 +4,7 @@ use super::outcome::{Outcome, Reach, relative_state};
 use super::setup::Setup;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
+use crate::game::validation::BEYOND;
 use crate::network::{Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
@@ -42,7 +43,8 @@ pub struct Record {
 /// Runs one game and records everything.
 ///
 /// # Errors
-/// [`RunError`] for positions or radii that break a rule, or when the caller cancelled.
+/// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision, or when
+/// the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
     setup.check(policy.game())?;
     let game = policy.game();
@@ -78,6 +80,9 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
         }
         let step = policy.at(k, &topology, &mut solver);
         record.push(policy, k, &z, &attacker, &topology, &step);
+        if !record.last_row_is_bounded(n + 2) {
+            return Err(RunError::Range { trial: None, time: game.grid().time(k) });
+        }
         if let Some(outcome) = end {
             record.outcome = outcome;
             record.steps = k;
@@ -111,6 +116,12 @@ pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
 }
 
 impl Record {
+    fn last_row_is_bounded(&self, players: usize) -> bool {
+        let row = players * self.dim;
+        let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
+        tails.into_iter().flatten().all(|x| x.abs() <= BEYOND) && self.theta.last().is_some_and(|x| x.is_finite())
+    }
+
     fn push(&mut self, policy: &Policy, k: usize, z: &[f64], attacker: &[f64], network: &Topology, step: &StepPolicy) {
         let dim = self.dim;
         for row in z.chunks_exact(dim) {

@@ -2,7 +2,7 @@
 
 use crate::error::GameError;
 use crate::game::Game;
-use crate::game::validation::{positive, rule};
+use crate::game::validation::{FARTHEST, positive, rule};
 
 /// Positions and radii of one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +39,10 @@ impl Setup<'_> {
         if let Some(e) = self.positions.iter().position(|x| !x.is_finite()) {
             let field = format!("positions[{}, {}]", e / self.dim, e % self.dim);
             rule(&field, self.positions[e], false, "a finite number")?;
+        }
+        if let Some(e) = self.positions.iter().position(|x| x.abs() > FARTHEST) {
+            let field = format!("positions[{}, {}]", e / self.dim, e % self.dim);
+            rule(&field, self.positions[e], false, "between -1e100 and 1e100")?;
         }
         if let Some(i) = self.visibility.iter().position(|&zeta| zeta.is_nan() || zeta <= 0.0) {
             rule(&format!("visibility_radii[{i}]"), self.visibility[i], false, "a positive number or infinity")?;

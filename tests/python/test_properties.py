@@ -1,0 +1,123 @@
+"""What holds for every valid scenario, found by Hypothesis; the theorems themselves are in test_oracle_theorems."""
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+import tadcore
+from tadcore import Scenario, TadcoreError
+from tadcore.store import Manifest
+
+PLAIN, NEAR, SMALL = st.floats(0.3, 3.0), st.floats(-3.0, 3.0), st.floats(0.05, 0.4)
+ANY_WEIGHT = st.floats(1e-30, 1e30)
+ANY_POSITIVE = st.floats(min_value=0.0, exclude_min=True, allow_nan=False, allow_infinity=False)
+ANY_COORDINATE = st.floats(-1e100, 1e100)
+
+
+@st.composite
+def scenarios(draw, most=4, weight=PLAIN, coordinate=NEAR, radius=SMALL, steps=10):
+    """A valid scenario of either interaction, in the plane or in space, with or without its optional fields."""
+    interaction, axes = draw(st.sampled_from(["I1", "I2"])), draw(st.sampled_from([2, 3]))
+
+    def part(needed, optional):
+        table = {"position": draw(st.lists(coordinate, min_size=axes, max_size=axes)), "control_weight": draw(weight)}
+        table |= {name: draw(weight) for name in optional if draw(st.booleans())}
+        return table | {name: draw(radius) for name in needed}
+
+    own = ["running_weight", "terminal_weight"] if interaction == "I1" else []
+    count = draw(st.integers(1, steps))
+    step = draw(st.floats(0.01, 0.05))
+    data = {
+        "interaction": interaction,
+        "horizon": count * step,
+        "step": step,
+        "attacker": part(["capture_radius"], ["target_running_weight", "target_terminal_weight"]),
+        "target": part([], own),
+        "defenders": [
+            part(["capture_radius"], [*own, "evasion_running_weight", "evasion_terminal_weight"])
+            for _ in range(draw(st.integers(1, most)))
+        ],
+    }
+    for d in data["defenders"]:
+        if draw(st.booleans()):
+            sight = d["capture_radius"] * draw(st.floats(1.001, 40.0))
+            d["visibility_radius"] = sight if sight > d["capture_radius"] else math.inf
+    if interaction == "I1" and draw(st.booleans()):
+        data["attacker"]["evasion"] = draw(st.floats(0.0, 1.0))
+    if interaction == "I2" and draw(st.booleans()):
+        data["target"]["visibility_radius"] = draw(radius)
+    if draw(st.booleans()):
+        terms = 4 if interaction == "I1" else 3
+        gamma = draw(st.lists(st.floats(0.0, 1.0), min_size=terms, max_size=terms))
+        data["synthesis_weights"] = [gamma[0] or 1.0, *gamma[1:]]
+    return Scenario.model_validate(data)
+
+
+def bits(sc):
+    """Every number of a scenario, to the bit."""
+
+    def walk(value):
+        if isinstance(value, dict):
+            return {key: walk(entry) for key, entry in value.items()}
+        if isinstance(value, list | tuple):
+            return [walk(entry) for entry in value]
+        return value.hex() if isinstance(value, float) else value
+
+    return walk(sc.model_dump())
+
+
+@given(scenarios(weight=ANY_WEIGHT, coordinate=ANY_COORDINATE, radius=ANY_POSITIVE))
+def test_toml_loses_no_bit(sc):
+    again = Scenario.from_toml_string(sc.to_toml())
+    assert bits(again) == bits(sc)
+    assert again == sc
+    assert again.to_toml() == sc.to_toml()
+
+
+@given(scenarios(), st.integers(0, 2**32 - 1), st.integers(1, 3))
+def test_a_batch_is_its_single_runs_whatever_varies(sc, seed, threads):
+    rng = np.random.default_rng(seed)
+    games = int(rng.integers(1, 12))
+    positions = sc.positions + rng.normal(scale=0.4, size=(games, *sc.positions.shape))
+    capture = sc.capture_radii * rng.uniform(0.5, 1.0, (games, sc.n + 1))
+    try:
+        batch = tadcore.simulate_batch(sc, positions, capture_radii=capture, threads=threads)
+    except TadcoreError:
+        with np.testing.assert_raises(TadcoreError):
+            tadcore.solve_equilibrium(sc)
+        return
+    for i in range(games):
+        changes = {"attacker.position": positions[i, -1], "target.position": positions[i, -2]}
+        changes |= {f"defenders[{j}].position": positions[i, j] for j in range(sc.n)}
+        changes |= {f"defenders[{j}].capture_radius": capture[i, j] for j in range(sc.n)}
+        changes["attacker.capture_radius"] = capture[i, -1]
+        assert tadcore.simulate(sc.replace(changes)).outcome == batch[i]
+
+
+@given(scenarios())
+def test_costs_and_values_are_finite(sc):
+    try:
+        run = tadcore.simulate(sc)
+    except TadcoreError:
+        return
+    assert all(math.isfinite(value) for value in run.costs.values())
+    z = run.position[:, :-1] - run.position[:, -1:]
+    for P in tadcore.solve_equilibrium(sc).P.values():
+        assert np.isfinite(np.einsum("kia,kij,kja->k", z, P[: len(z)], z)).all()
+    assert np.isfinite(run.theta).all()
+    assert (run.theta >= 0.0).all()
+
+
+@given(scenarios(), st.integers(0, 2**64 - 1), st.sampled_from(["random", "sobol", "latin"]))
+def test_a_manifest_loses_nothing(tmp_path_factory, sc, seed, design):
+    folder = tmp_path_factory.mktemp("manifest")
+    vary = {
+        "attacker.position": {"disk": {"center": [0.0, 1.0], "radius": 0.1}},
+        "defenders.0.visibility_radius": {"values": [1.0, math.inf]},
+    }
+    wanted = Manifest(sc.to_toml(), vary, seed, design, 100, ("attacker.position.x",))
+    (folder / "manifest.json").write_text(wanted.to_json(), encoding="utf-8")
+    assert Manifest.read(folder) == wanted
+    assert Scenario.from_toml_string(Manifest.read(folder).scenario) == sc
