@@ -11,6 +11,7 @@ room                        what it answers
 ``record``                  is the record what the equations say
 ``consistency``             full sight gives the equilibrium (thm:consistency); how far the indices are from the own
 ``gains``, ``objective``    gradient, curvature in full blocks, other starts, how often certificates hold
+``bounds``                  a lower bound on Θ by semidefinite programming, and the gap (extra ``bounds``)
 ``geometry``                straight line (thm:straight_line), radius delay (thm:delayproperty), symmetries
 ``steps``, ``events``       δ, δ/2, δ/4; chattering; the continuous game by its event times, sliding modes included
 ``externality``             the jump of every player's control at every change of the network
@@ -29,6 +30,7 @@ from tadcore.errors import ScenarioError, VerificationError
 from tadcore.simulation import Run, simulate
 
 from .adapted import Adapted, Deviation, Index
+from .bounds import ThetaBound, require_clarabel, theta_bound
 from .consistency import check_consistency, index_distance
 from .decentral import Decentralised, check_decentral, decentralise
 from .events import Event, EventPlay, play_by_events
@@ -60,6 +62,7 @@ __all__ = [
     "Measurement",
     "Refinement",
     "StepStudy",
+    "ThetaBound",
     "VerificationError",
     "VerificationReport",
     "adapted_weights",
@@ -89,12 +92,19 @@ __all__ = [
     "riccati_defect",
     "sampling_gap",
     "step_study",
+    "theta_bound",
     "verify",
 ]
 
 
 def verify(
-    sc_or_run: Scenario | Run, *, deviations: int = 2, instants: int = 20, starts: int = 0, seed: int = 0
+    sc_or_run: Scenario | Run,
+    *,
+    deviations: int = 2,
+    instants: int = 20,
+    starts: int = 0,
+    seed: int = 0,
+    bound: bool = False,
 ) -> VerificationReport:
     """Check the paper's theorems on a scenario or on a run.
 
@@ -110,6 +120,8 @@ def verify(
         Random starts at each of those instants; none by default, since they take seconds.
     seed : int
         Key of the deviations and the starts.
+    bound : bool
+        Whether to bound Θ from below at those instants and report the gap; needs Clarabel, the extra ``bounds``.
 
     Returns
     -------
@@ -121,7 +133,7 @@ def verify(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     ScenarioError
-        The argument is neither a scenario nor a run.
+        The argument is neither a scenario nor a run, or a bound is asked for and Clarabel is not installed.
 
     Examples
     --------
@@ -136,6 +148,8 @@ def verify(
 
     if not isinstance(sc_or_run, Scenario | Run):
         raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")
+    if bound:
+        require_clarabel()
     run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run
     equilibrium = solve_equilibrium(run.scenario)
     title = f"{run.scenario.interaction}: {run.outcome}"
@@ -147,7 +161,7 @@ def verify(
         check_record(run, equilibrium),
         check_nafne(run, equilibrium, deviations=deviations, seed=seed),
         check_consistency(run, equilibrium),
-        check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed),
+        check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed, bound=bound),
         check_geometry(run, seed=seed),
         check_decentral(run),
         check_steps(run),
