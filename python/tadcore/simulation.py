@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     import xarray
 
+    from ._chatter import Chatter
     from ._plots import Plots
     from .plotting import Animation
     from .scenario import Scenario
@@ -106,6 +107,17 @@ class Run:
         """(start, end, edges) of the stretches with one network, the last up to the end of the game."""
         return intervals_of(self.network_changes, self.outcome.time)
 
+    @cached_property
+    def chattering(self) -> tuple[Chatter, ...]:
+        """Stretches in which one edge flips at almost every instant: (edge, start, end, flips), in order of time.
+
+        At least six flips, never more than five steps apart: a sliding mode of the continuous game, whose number of
+        flips is a property of δ. `tadcore.verification.sliding_study` finds its limit.
+        """
+        from ._chatter import chatter
+
+        return chatter(self)
+
     @property
     def plot(self) -> Plots:
         """Figures of this run by name: ``run.plot.trajectories()``, ``.network()``, ``.controls()`` and so on."""
@@ -149,7 +161,9 @@ class Run:
         changes = max(len(self.network_changes) - 1, 0)
         network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
         warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
-        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{warning})"
+        edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
+        loud = f", chattering: {', '.join(edges)}" if edges else ""
+        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{loud}{warning})"
 
 
 def simulate(sc: Scenario) -> Run:

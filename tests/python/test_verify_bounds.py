@@ -43,10 +43,69 @@ def test_no_search_goes_below_it_in_reduced_gains_or_in_full_blocks(seed, n, int
     m = matrices_of(sc)
     full = FullObjective(sc, m, m.values(tadcore.solve_equilibrium(sc).P)[:, k], network)
     assert full.dim == 2
-    assert bound.value <= v.multistart(full, full.blocks(found.rows), 1, rng) + rounding
+    blocks = v.theta_bound(sc, step=k, adjacency=network, blocks=True)
+    assert blocks.value <= min(bound.value, v.multistart(full, full.blocks(found.rows), 1, rng)) + rounding
     if found.certified:
         assert abs(bound.relative_gap) < 1e-6
         assert bound.tight
+
+
+TURNING = """
+interaction = "I1"
+horizon = 3.0
+step = 0.05
+[attacker]
+position = [-2.0, 2.0]
+capture_radius = 0.1
+control_weight = 0.3315
+target_running_weight = 1.6257
+target_terminal_weight = 0.8612
+[target]
+position = [0.0, 1.0]
+control_weight = 1.2899
+running_weight = 1.1005
+terminal_weight = 1.1963
+[[defenders]]
+position = [0.0, 0.0]
+capture_radius = 0.1
+control_weight = 0.8784
+running_weight = 0.7734
+terminal_weight = 0.691
+evasion_running_weight = 0.7217
+evasion_terminal_weight = 0.3459
+[[defenders]]
+position = [1.0, 0.0]
+capture_radius = 0.1
+control_weight = 1.4684
+running_weight = 0.6875
+terminal_weight = 1.2527
+evasion_running_weight = 0.4087
+evasion_terminal_weight = 0.7389
+[[defenders]]
+position = [2.0, 0.0]
+capture_radius = 0.1
+control_weight = 2.0226
+running_weight = 2.1983
+terminal_weight = 2.5144
+evasion_running_weight = 1.9441
+evasion_terminal_weight = 0.3826
+"""
+
+
+def test_blocks_that_turn_can_do_better_than_scalars_and_only_their_own_bound_holds(tmp_path):
+    """In I1 the best 2 × 2 blocks need not be multiples of the identity: the two bounds are two claims."""
+    (tmp_path / "turning.toml").write_text(TURNING, encoding="utf-8")
+    sc = tadcore.Scenario.from_toml(tmp_path / "turning.toml")
+    network = np.array([[0, 1, 1, 0], [1, 0, 1, 0], [0, 0, 0, 0]], dtype=bool)
+    scalars = v.theta_bound(sc, step=27, adjacency=network)
+    blocks = v.theta_bound(sc, step=27, adjacency=network, blocks=True)
+    m = matrices_of(sc)
+    values = m.values(tadcore.solve_equilibrium(sc).P)[:, 27]
+    full, reduced = (FullObjective(sc, m, values, network, dim=dim) for dim in (2, 1))
+    rows = tadcore.synthesize(sc, step=27, adjacency=network).rows
+    best = v.multistart(full, full.blocks(rows), 12, np.random.default_rng(0))
+    assert blocks.value < best < scalars.value < scalars.theta
+    assert v.multistart(reduced, reduced.blocks(rows), 12, np.random.default_rng(0)) == pytest.approx(scalars.theta)
 
 
 def relaxed(game, P, network, copies, rng):

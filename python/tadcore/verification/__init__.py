@@ -13,7 +13,8 @@ room                        what it answers
 ``gains``, ``objective``    gradient, curvature in full blocks, other starts, how often certificates hold
 ``bounds``                  a lower bound on Θ by semidefinite programming, and the gap (extra ``bounds``)
 ``geometry``                straight line (thm:straight_line), radius delay (thm:delayproperty), symmetries
-``steps``, ``events``       δ, δ/2, δ/4; chattering; the continuous game by its event times, sliding modes included
+``steps``                   δ, δ/2, δ/4: what depends on the step
+``events``, ``sliding``     the continuous game by its event times, sliding modes included; how chattering tends to them
 ``externality``             the jump of every player's control at every change of the network
 ``decentral``               the synthesis as a protocol between players (rem:networkexternality)
 ==========================  =====================================================================================
@@ -25,6 +26,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tadcore._chatter import Chatter, chatter
 from tadcore.equilibrium import solve_equilibrium
 from tadcore.errors import ScenarioError, VerificationError
 from tadcore.simulation import Run, simulate
@@ -33,16 +35,18 @@ from .adapted import Adapted, Deviation, Index
 from .bounds import ThetaBound, require_clarabel, theta_bound
 from .consistency import check_consistency, index_distance
 from .decentral import Decentralised, check_decentral, decentralise
-from .events import Event, EventPlay, play_by_events
+from .events import play_by_events
 from .externality import control_jumps
 from .fne import BestResponse, best_responses, check_equilibrium, riccati_defect
 from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
 from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
 from .indices import AdaptedWeights, adapted_weights
 from .nafne import check_nafne, gap_order, sampling_gap
+from .plays import Event, EventPlay, Slide
 from .record import check_record
 from .report import Check, Measurement, VerificationReport, combine
-from .steps import Chatter, Refinement, StepStudy, chatter, check_steps, refine_batch, step_study
+from .sliding import SlidingStudy, sliding_study
+from .steps import Refinement, StepStudy, check_steps, refine_batch, step_study
 
 if TYPE_CHECKING:
     from tadcore.scenario import Scenario
@@ -61,6 +65,8 @@ __all__ = [
     "Index",
     "Measurement",
     "Refinement",
+    "Slide",
+    "SlidingStudy",
     "StepStudy",
     "ThetaBound",
     "VerificationError",
@@ -91,6 +97,7 @@ __all__ = [
     "relabelled",
     "riccati_defect",
     "sampling_gap",
+    "sliding_study",
     "step_study",
     "theta_bound",
     "verify",

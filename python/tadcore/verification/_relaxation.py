@@ -17,25 +17,32 @@ _SHIFTS = (0.0, *(10.0**e for e in range(-15, 3)))
 
 
 class Form:
-    """Θ as γ₁‖Σ_i r_i g_iᵀg_i - M‖² + ‖Ax - b‖² with orthonormal unknowns in every row."""
+    """Θ as γ₁‖Σ_i r_i g_iᵀg_i - M‖² + ‖Ax - b‖² with orthonormal unknowns in every row.
 
-    def __init__(self, objective: FullObjective) -> None:
+    With `blocks` also the form of gains that turn, DJ with J antisymmetric: ‖X + Xᵀ‖² of eq:perfindex is ‖X - Xᵀ‖²
+    there.
+    """
+
+    def __init__(self, objective: FullObjective, blocks: bool = False) -> None:
         m, N = objective.limited, objective.size
         self.gamma, self.r = float(objective.gamma[0]), objective.R[:, 0]
         self.M = objective.constant
         directions = objective.rows(np.eye(objective.unknowns)).reshape(-1, m, N)
         owner = objective.seen[:, 0]
-        blocks = [(i, np.linalg.qr(directions[owner == i, i].T)[0].T) for i in np.unique(owner).tolist()]
-        self.owner = np.concatenate([np.full(len(q), i) for i, q in blocks]).astype(int) if blocks else owner
-        self.V = np.concatenate([q for _, q in blocks]) if blocks else np.zeros((0, N))
+        parts = [(i, np.linalg.qr(directions[owner == i, i].T)[0].T) for i in np.unique(owner).tolist()]
+        self.owner = np.concatenate([np.full(len(q), i) for i, q in parts]).astype(int) if parts else owner
+        self.V = np.concatenate([q for _, q in parts]) if parts else np.zeros((0, N))
         self.size = len(self.V)
         self.b = -self._residual(objective, np.zeros((m, N)))
-        self.A = np.zeros((len(self.b), self.size))
+        self.A, turning = np.zeros((2, len(self.b), self.size))
         for v in range(self.size):
             G = np.zeros((m, N))
             G[self.owner[v]] = self.V[v]
             self.A[:, v] = self._residual(objective, G) + self.b
-        self.H0, self.h = self.A.T @ self.A, self.A.T @ self.b
+            turning[:, v] = self._turning(objective, G)
+        self.h = self.A.T @ self.b
+        self.H0 = self.A.T @ self.A
+        self.turning = turning.T @ turning if blocks and len(objective.BP) > 1 else None
         self.same = self.owner[:, None] == self.owner
         self.scale = float(self.b @ self.b) + self.gamma * float(np.sum(self.M**2))
 
@@ -49,16 +56,25 @@ class Form:
         ]
         return np.concatenate([np.ravel(part) for part in parts])
 
-    def H(self, Y: Floats) -> Floats:
-        """AᵀA + 2γ₁D(Y)."""
-        weight = 2.0 * self.gamma * np.where(self.same, self.r[self.owner], 0.0)
-        form: Floats = self.H0 + weight * (self.V @ Y @ self.V.T)
+    @staticmethod
+    def _turning(objective: FullObjective, G: Floats) -> Floats:
+        """The same for gains GJ, without what does not depend on them."""
+        across = [np.sqrt(g) * (BP.T @ G) for g, BP in zip(objective.gamma[1:], objective.BP[1:], strict=False)]
+        parts = [np.sqrt(objective.weight) * objective.R * G, *(X - X.T for X in across)]
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    def D(self, Y: Floats) -> Floats:
+        """2γ₁D(Y)."""
+        form: Floats = 2.0 * self.gamma * np.where(self.same, self.r[self.owner], 0.0) * (self.V @ Y @ self.V.T)
         return form
 
     def value(self, Y: Floats) -> tuple[float, Floats | None]:
-        """β(Y) and the x at which the quadratic function is that small; -inf where H(Y) is not positive definite."""
+        """β(Y) and the x at which the quadratic function is that small; -inf where a form is not positive definite."""
+        form = self.D(Y)
         try:
-            x = cho_solve(cho_factor(self.H(Y)), self.h)
+            x = cho_solve(cho_factor(self.H0 + form), self.h)
+            if self.turning is not None:
+                cho_factor(self.turning + form)
         except LinAlgError:
             return -np.inf, None
         rest = float(self.b @ self.b) - float(self.h @ x)
@@ -87,10 +103,10 @@ class Form:
     def _ascent(self, Y: Floats, x: Floats) -> Floats:
         """Newton's step for β: its slope along E is xᵀH'x - 2γ₁⟨Y + M, E⟩, H' = 2γ₁D(E), and x moves by -H⁻¹H'x."""
         E = np.stack([unit for _, unit in _symmetric(len(Y))])
-        pushed = np.stack([(self.H(e) - self.H0) @ x for e in E])
+        pushed = np.stack([self.D(e) @ x for e in E])
         slope = pushed @ x - 2.0 * self.gamma * np.tensordot(E, Y + self.M, axes=2)
         curve = 2.0 * self.gamma * np.tensordot(E, E, axes=([1, 2], [1, 2]))
-        curve = curve + 2.0 * pushed @ cho_solve(cho_factor(self.H(Y)), pushed.T)
+        curve = curve + 2.0 * pushed @ cho_solve(cho_factor(self.H0 + self.D(Y)), pushed.T)
         step: Floats = np.tensordot(np.linalg.solve(curve, slope), E, axes=1)
         return step
 
@@ -121,7 +137,7 @@ def solve(form: Form) -> tuple[Floats, str, int]:
     weight = np.array([1.0 if a == b else 2.0 for a, b in pairs])
     P = sparse.diags(np.append(2.0 * form.gamma * unit**2 / form.scale * weight, np.zeros(count)), format="csc")
     q = np.append(2.0 * form.gamma * unit / form.scale * weight * [form.M[a, b] for a, b in pairs], np.ones(count))
-    slopes = [(form.H(unit * E) - form.H0) * length**2 / form.scale for _, E in basis]
+    slopes = [form.D(unit * E) * length**2 / form.scale for _, E in basis]
     H0, h = form.H0 * length**2 / form.scale, form.h * length / form.scale
     rows, right, cones = [], [], []
     for c in range(count):
@@ -137,6 +153,11 @@ def solve(form: Form) -> tuple[Floats, str, int]:
         rows.append(-np.stack([_triangle(X) for X in columns], axis=1))
         right.append(_triangle(fixed))
         cones.append(clarabel.PSDTriangleConeT(size))
+    if form.turning is not None:
+        columns = [*slopes, *[0.0 * H0] * count]
+        rows.append(-np.stack([_triangle(X) for X in columns], axis=1))
+        right.append(_triangle(form.turning * length**2 / form.scale))
+        cones.append(clarabel.PSDTriangleConeT(form.size))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10

@@ -13,8 +13,11 @@ solver was.
 
 - At a critical point with residual X*, β(X*) = Θ* exactly where H(X*) is positive semidefinite. That is the certificate
   of the synthesis (`tadcore.Gains.certified`): the bound is tight if and only if some minimiser can be certified.
-- Gains in full blocks of dim × dim are bounded too: averaging their second moments over all rotations leaves the terms
-  linear in them and can only lower the convex ones, so Θ/dim ≥ β there.
+- The library's gains are scalars, one for each player seen. The paper's are blocks of dim × dim. Split into a multiple
+  of the identity, a symmetric part without trace and an antisymmetric one, and averaged over all rotations, blocks keep
+  the terms linear in them and can only lower the convex ones. So Θ/dim ≥ β there too, if Y also makes the quadratic
+  form of antisymmetric blocks positive definite. In I2 the two forms are the same; in I1 they are not, since ΔQ_τ and
+  ΔQ_a are X + Xᵀ and the transpose of an antisymmetric block is its negative. ``blocks=True`` asks for this.
 - Where a gap is left nothing is proved: a minimum may be global all the same.
 """
 
@@ -53,7 +56,7 @@ class ThetaBound:
     Attributes
     ----------
     value : float
-        The bound, in reduced norms like ``Gains.theta``; no gains that the network allows have a smaller Θ. -inf where
+        The bound, in reduced norms like ``Gains.theta``; no gains of the kind asked for have a smaller Θ. -inf where
         the solver returned nothing usable.
     theta : float
         Θ of the gains that are compared with it.
@@ -90,7 +93,9 @@ class ThetaBound:
         return self.relative_gap < _TIGHT
 
 
-def theta_bound(sc: Scenario, *, step: int, adjacency: ArrayLike | VisibilityNetwork) -> ThetaBound:
+def theta_bound(
+    sc: Scenario, *, step: int, adjacency: ArrayLike | VisibilityNetwork, blocks: bool = False
+) -> ThetaBound:
     """Bound Θ from below at instant t_k under a network, and compare it with the gains of `tadcore.synthesize`.
 
     Parameters
@@ -101,6 +106,8 @@ def theta_bound(sc: Scenario, *, step: int, adjacency: ArrayLike | VisibilityNet
         k of the instant t_k, 0 … K.
     adjacency : array_like, shape (m, N), or VisibilityNetwork
         𝒜: row i whom player i sees, entry j ≠ i the player j, entry i the attacker; 0-1 or bool.
+    blocks : bool
+        Whether to bound Θ/dim over the paper's dim × dim blocks, and not over scalar gains alone.
 
     Returns
     -------
@@ -128,7 +135,7 @@ def theta_bound(sc: Scenario, *, step: int, adjacency: ArrayLike | VisibilityNet
     k = as_index("step", step, sc.steps)
     m = matrices_of(sc)
     objective = FullObjective(sc, m, m.values(solve_equilibrium(sc).P)[:, k], seen, dim=1)
-    return bound_theta(objective, synthesize(sc, step=k, adjacency=seen).theta)
+    return bound_theta(objective, synthesize(sc, step=k, adjacency=seen).theta, blocks=blocks)
 
 
 def require_clarabel() -> None:
@@ -137,7 +144,7 @@ def require_clarabel() -> None:
         raise ScenarioError("bound", MISSING, "asked for with Clarabel installed: pip install 'tadcore[bounds]'")
 
 
-def bound_theta(objective: FullObjective, theta: float) -> ThetaBound:
+def bound_theta(objective: FullObjective, theta: float, *, blocks: bool = False) -> ThetaBound:
     """Bound an objective in reduced gains (``dim=1``); `theta` is the value that the gap is measured from.
 
     Parameters
@@ -146,13 +153,15 @@ def bound_theta(objective: FullObjective, theta: float) -> ThetaBound:
         Θ at one instant and one network, with one axis.
     theta : float
         The best Θ known.
+    blocks : bool
+        Whether the bound is to hold for gains in full blocks.
 
     Returns
     -------
     ThetaBound
         The bound, the gap and the solver's status.
     """
-    form = Form(objective)
+    form = Form(objective, blocks)
     if form.size == 0 or form.gamma == 0.0:  # a constant, or linear least squares
         solution = np.linalg.lstsq(form.A, form.b, rcond=None)[0]
         residual = form.A @ solution - form.b

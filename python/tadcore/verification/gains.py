@@ -144,7 +144,7 @@ def check_gains(
         detail = f"smallest over largest {flattest:.2g}, {len(chosen)} instants"
         checks.append(Check("gains.curvature", value, _CURVATURE, True, remedy, label, detail))
     if starts:
-        remedy = "a random start went lower: a worse minimum was taken there; report this scenario"
+        remedy = "a start in full blocks went lower: blocks that turn do better there, or a worse minimum was taken"
         where = f"{starts} starts at each of {len(chosen)} instants" + (
             f", t = {run.times[where_lower]:.6g}" if worst else ""
         )
