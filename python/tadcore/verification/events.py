@@ -116,7 +116,7 @@ class _Play:
     def _close(self, time: float) -> None:
         """Note the slide under way, if any, as over."""
         if self.sliding is not None:
-            share = self.shown / (time - self.began) if time > self.began else self.shown
+            share = min(self.shown / (time - self.began), 1.0) if time > self.began else 0.5
             self.slides.append(Slide(self._edges(self.sliding), self.began, time, share))
             self.sliding = None
 
