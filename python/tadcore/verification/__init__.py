@@ -5,7 +5,7 @@
 ==========================  =====================================================================================
 room                        what it answers
 ==========================  =====================================================================================
-``fne``                     does P solve its Riccati equation, and does anyone gain by deviating (thm:fbne,
+``fne``, ``responses``      does P solve its Riccati equation, and does anyone gain by deviating (thm:fbne,
                             thm:zero:sum:game)
 ``adapted``, ``nafne``      S, ΔQ^Ad, the indices J^Ad in continuous time and their identities (thm:thm1, thm:thm2)
 ``record``                  is the record what the equations say
@@ -37,7 +37,7 @@ from .consistency import check_consistency, index_distance
 from .decentral import Decentralised, check_decentral, decentralise
 from .events import play_by_events
 from .externality import control_jumps
-from .fne import BestResponse, best_responses, check_equilibrium, riccati_defect
+from .fne import check_equilibrium, riccati_defect
 from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
 from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
 from .indices import AdaptedWeights, adapted_weights
@@ -45,6 +45,7 @@ from .nafne import check_nafne, gap_order, sampling_gap
 from .plays import Event, EventPlay, Slide
 from .record import check_record
 from .report import Check, Measurement, VerificationReport, combine
+from .responses import BestResponse, best_responses
 from .sliding import SlidingStudy, sliding_study
 from .steps import Refinement, StepStudy, check_steps, refine_batch, step_study
 
@@ -140,7 +141,8 @@ def verify(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     ScenarioError
-        The argument is neither a scenario nor a run, or a bound is asked for and Clarabel is not installed.
+        The argument is neither a scenario nor a run, or a run with hysteresis or dwell, or a bound is asked for and
+        Clarabel is not installed.
 
     Examples
     --------
@@ -157,6 +159,8 @@ def verify(
         raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")
     if bound:
         require_clarabel()
+    if isinstance(sc_or_run, Run) and sc_or_run.variant:
+        raise ScenarioError("sc_or_run", f"a run with {sc_or_run.variant}", "a run of the paper's game, without either")
     run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run
     equilibrium = solve_equilibrium(run.scenario)
     title = f"{run.scenario.interaction}: {run.outcome}"
