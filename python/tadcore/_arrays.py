@@ -74,6 +74,17 @@ def as_adjacency(values: Any, shape: tuple[int, int]) -> NDArray[np.bool_]:
     return np.array(array, dtype=np.bool_, order="C")
 
 
+def as_amount(field: str, value: Any) -> float:
+    """A finite number of at least 0; bools are refused."""
+    if (
+        isinstance(value, int | float | np.integer | np.floating)
+        and not isinstance(value, bool)
+        and 0 <= value < np.inf
+    ):
+        return float(value)
+    raise ScenarioError(field, value, "a finite number of at least 0")
+
+
 def as_index(field: str, value: Any, most: int, *, least: int = 0) -> int:
     """An int in [least, most]; bools and floats are refused."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:

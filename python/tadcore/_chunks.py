@@ -92,10 +92,11 @@ class Plan:
         _, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
             rule = "larger than the defender's capture radius"
-            bad = capture[:, i] >= sight[:, i]
+            reach, seen = (np.broadcast_to(radii[..., i], len(inputs)) for radii in (capture, sight))
+            bad = reach >= seen
             if bad.any():
-                rule += f", {float(capture[int(bad.argmax()), i])!r}"
-            self._refuse(chunk, f"defenders.{i}.visibility_radius", sight[:, i], bad, rule)
+                rule += f", {float(reach[int(bad.argmax())])!r}"
+            self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, rule)
 
     def check_ahead(self, trials: int) -> None:
         """Check what can be checked before anything runs.

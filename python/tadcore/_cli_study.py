@@ -19,6 +19,10 @@ def study(
     file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary, how, and how often.")],
     store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Keep the game's table of gains there: read before, written after."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
 ) -> None:
@@ -27,6 +31,7 @@ def study(
     \b
       tadcore study my-study.toml --store out
       tadcore study my-study.toml --store out --threads 4 --no-progress
+      tadcore study my-study.toml --store out --table paper-i1.table
 
     Run again, it goes on from what DIR holds. A study file looks like this:
 
@@ -48,7 +53,7 @@ def study(
     if resume:
         Manifest.read(store)
     try:
-        result = wanted.run(progress=progress, store=store, threads=threads)
+        result = wanted.run(progress=progress, store=store, threads=threads, table=table)
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command goes on from there")
         raise typer.Exit(_INTERRUPTED) from None

@@ -30,6 +30,7 @@ def register(app: typer.Typer, load: Callable[[str], Scenario]) -> None:
         deviations: Annotated[int, typer.Option(min=0, help="Random deviations of each player.")] = 2,
         starts: Annotated[int, typer.Option(min=0, help="Random starts of the synthesis at chosen instants.")] = 0,
         seed: Annotated[int, typer.Option(min=0, help="Key of everything random.")] = 0,
+        bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
         out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,
     ) -> None:
         """Check the paper's theorems on a scenario: equilibrium, indices, consistency, gains, geometry.
@@ -43,7 +44,7 @@ def register(app: typer.Typer, load: Callable[[str], Scenario]) -> None:
         """
         from .verification import verify as check
 
-        report = check(load(file), deviations=deviations, starts=starts, seed=seed)
+        report = check(load(file), deviations=deviations, starts=starts, seed=seed, bound=bound)
         if out is not None:
             write_whole(out, json.dumps(report.to_dict(), indent=2) + "\n")
         for line in report.lines():

@@ -54,6 +54,9 @@ class Game:
         positions: NDArray[np.float64],
         visibility_radii: NDArray[np.float64],
         capture_radii: NDArray[np.float64],
+        *,
+        hysteresis: float = 0.0,
+        dwell: float = 0.0,
     ) -> Record: ...
     def simulate_batch(
         self,

@@ -75,9 +75,21 @@ def dataset_of(run: Run) -> xr.Dataset:
             "title": str(run.outcome),
             "interaction": sc.interaction,
             "references": _PAPER,
+            **variant_of(run),
             **provenance(sc),
         },
     )
+
+
+def variant_of(run: Run) -> dict[str, Any]:
+    """What a reader of a file must know of a run that is not the paper's game; empty for one that is."""
+    if not run.variant:
+        return {}
+    return {
+        "variant": f"not the paper's game: edges with {run.variant}",
+        "hysteresis": run.hysteresis,
+        "dwell": run.dwell,
+    }
 
 
 def _about(name: str, symbol: str, source: str) -> dict[str, str]:
@@ -94,6 +106,7 @@ def summary_of(run: Run) -> dict[str, Any]:
             "time": run.outcome.time,
             "text": str(run.outcome),
         },
+        **variant_of(run),
         "network_changes": [
             {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
         ],

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import as_positions, as_real, refuse_where
-from ._inputs import Rows, place_of, rows_of
+from ._inputs import Rows, rows_of
+from ._vary import component
 from .batch import Batch, simulate_batch
 from .errors import MISSING, ScenarioError
 from .scenario import Scenario
@@ -44,7 +45,7 @@ class Replays:
         if player not in labels:
             raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
         owner = f"defenders.{int(player[1:]) - 1}" if player.startswith("d") else player
-        self.column = place_of(sc, f"{owner}.{kind}_radius")[1][0]
+        self.column = component(sc, f"{owner}.{kind}_radius").row
         self.sc, self.rows, self.kind, self.threads = sc, rows, kind, threads
         self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
 

@@ -23,7 +23,7 @@ from .sampling import Sampler
 if TYPE_CHECKING:
     from .scenario import Scenario
 
-__all__ = ["Quantity", "quantities", "setups"]
+__all__ = ["Quantity", "component", "quantities", "setups"]
 
 _AXES = "xyz"
 _PURPOSES = {"position": 0, "visibility_radius": 1, "capture_radius": 2, "x": 3, "y": 4, "z": 5}
@@ -157,13 +157,27 @@ def game_fields(sc: Scenario) -> list[str]:
     return [f"{prefix}{name}" for prefix, table in tables for name in type(table).model_fields if name not in apart]
 
 
+def component(sc: Scenario, name: str) -> Quantity:
+    """The single number of that name, such as ``attacker.position.x`` or ``defenders.0.visibility_radius``."""
+    found = _known(sc).get(name) if isinstance(name, str) else None
+    if found is None or found.components > 1 or found.path.endswith(".position"):
+        rule = "a number that varies within one game, such as attacker.position.x or defenders.0.visibility_radius"
+        raise ScenarioError("input", name, f"{rule}, of a player of this game")
+    return found
+
+
 def setups(
     sc: Scenario, varied: tuple[Quantity, ...], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Positions (M, n + 2, dim), visibility (M, m) and capture radii (M, n + 1) from one column for each component."""
+    """Positions (M, n + 2, dim), visibility and capture radii from one column for each component.
+
+    Radii have one row for each trial, (M, m) and (M, n + 1), or where none of their kind varies one for all.
+    """
     games = len(values)
-    base = {"position": sc.positions, "visibility_radius": sc.visibility_radii, "capture_radius": sc.capture_radii}
-    arrays = {name: np.repeat(array[None], games, axis=0) for name, array in base.items()}
+    arrays = {"visibility_radius": sc.visibility_radii, "capture_radius": sc.capture_radii}
+    arrays |= {"position": sc.positions}
+    for name in {"position"} | {quantity.field for quantity in varied}:
+        arrays[name] = np.repeat(arrays[name][np.newaxis], games, axis=0)
     column = 0
     for quantity in varied:
         drawn = values[:, column : column + quantity.components]

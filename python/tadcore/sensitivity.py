@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arrays import as_index
-from ._inputs import place_of, rows_of
+from ._inputs import rows_of
+from ._vary import component
 from .batch import simulate_batch
 from .errors import ScenarioError
 from .statistics._outcomes import as_level, indicators, outcome_names
@@ -159,7 +160,7 @@ def sensitivity(
         if output not in known:
             raise ScenarioError("outputs", output, f"one of {', '.join(known)}")
     for name in inputs:
-        place_of(sc, name)
+        component(sc, name)
 
     def play(x: Floats) -> Floats:
         rows = rows_of(sc, dict(zip(inputs, x, strict=True)), x.shape[1])

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arrays import as_amount
 from ._game import game_of
 from .network import Interval, NetworkChange, changes_of, intervals_of
 from .outcome import Outcome
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     import xarray
 
+    from ._chatter import Chatter
     from ._plots import Plots
     from .plotting import Animation
     from .scenario import Scenario
@@ -65,6 +67,8 @@ class Run:
         Instants at which the synthesis stopped short of its tolerance.
     certified : int
         Rows of the record whose gains are proved to be globally optimal.
+    hysteresis, dwell : float
+        The rule by which edges form and break; zero in the paper's game. See `simulate`.
     """
 
     scenario: Scenario
@@ -80,6 +84,14 @@ class Run:
     iterations: int
     unconverged: int
     certified: int
+    hysteresis: float = 0.0
+    dwell: float = 0.0
+
+    @property
+    def variant(self) -> str:
+        """What sets this run apart from the paper's game, in words; empty where nothing does."""
+        named = {"hysteresis": self.hysteresis, "dwell": self.dwell}
+        return " and ".join(f"{name} {value:g}" for name, value in named.items() if value > 0.0)
 
     @property
     def converged(self) -> bool:
@@ -105,6 +117,17 @@ class Run:
     def intervals(self) -> tuple[Interval, ...]:
         """(start, end, edges) of the stretches with one network, the last up to the end of the game."""
         return intervals_of(self.network_changes, self.outcome.time)
+
+    @cached_property
+    def chattering(self) -> tuple[Chatter, ...]:
+        """Stretches in which one edge flips at almost every instant: (edge, start, end, flips), in order of time.
+
+        At least six flips, never more than five steps apart: a sliding mode of the continuous game, whose number of
+        flips is a property of δ. `tadcore.verification.sliding_study` finds its limit.
+        """
+        from ._chatter import chatter
+
+        return chatter(self)
 
     @property
     def plot(self) -> Plots:
@@ -149,16 +172,28 @@ class Run:
         changes = max(len(self.network_changes) - 1, 0)
         network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
         warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
-        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{warning})"
+        edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
+        loud = f", chattering: {', '.join(edges)}" if edges else ""
+        other = f"; a variant, edges with {self.variant}" if self.variant else ""
+        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{loud}{warning}{other})"
 
 
-def simulate(sc: Scenario) -> Run:
+def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Run:
     """Play a scenario and record everything.
 
     Parameters
     ----------
     sc : Scenario
         The game and its start.
+    hysteresis : float
+        h ≥ 0, a length. With h > 0 an edge forms at a distance of at most ζ and breaks only beyond ζ + h. The first
+        network is the paper's.
+    dwell : float
+        D ≥ 0, a time, rounded up to whole steps. With D > 0 an edge that changed keeps its state for D, wherever the
+        players are; the first network is no change.
+
+        Either makes it *another game than the paper's*, in which an edge must be there exactly when the distance is at
+        most ζ (eq:limob); the run says so. Batches and studies have no such variant.
 
     Returns
     -------
@@ -169,6 +204,8 @@ def simulate(sc: Scenario) -> Run:
     ------
     NoEquilibriumError
         The game has no equilibrium on [0, T].
+    ScenarioError
+        `hysteresis` or `dwell` is negative or not finite.
 
     Examples
     --------
@@ -179,7 +216,8 @@ def simulate(sc: Scenario) -> Run:
     >>> [change.time for change in run.network_changes]
     [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
     """
-    record = game_of(sc).simulate(sc.positions, sc.visibility_radii, sc.capture_radii)
+    rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
+    record = game_of(sc).simulate(sc.positions, sc.visibility_radii, sc.capture_radii, **rule)
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
         scenario=sc,
@@ -195,4 +233,5 @@ def simulate(sc: Scenario) -> Run:
         iterations=record.iterations,
         unconverged=record.unconverged,
         certified=record.certified,
+        **rule,
     )

@@ -33,7 +33,7 @@ def test_errors_load_nothing_but_the_standard_library():
     assert {name for name in outside if not name.startswith("_")} <= {"sitecustomize", "usercustomize"}
 
 
-@pytest.mark.parametrize("heavy", ["matplotlib", "xarray", "pandas", "bokeh"])
+@pytest.mark.parametrize("heavy", ["matplotlib", "xarray", "pandas", "bokeh", "clarabel"])
 def test_playing_a_game_draws_nothing(heavy):
     code = "import tadcore; run = tadcore.simulate(tadcore.scenarios.load('paper-i1')); run.network_changes; run.plot"
     assert heavy not in modules_of(code)
@@ -76,3 +76,4 @@ def test_extras_bring_what_their_part_imports():
     for module in loaded:
         assert module.replace("_", "-") in names["docs"], module
     assert "bokeh" in names["explore"]
+    assert "clarabel" in names["bounds"]

@@ -143,6 +143,15 @@ def test_the_command_plays_keeps_and_continues(written, tmp_path, capsys):
     assert "tadcore study my-study.toml --store out" in capsys.readouterr().out
 
 
+def test_the_command_keeps_the_table(written, tmp_path):
+    place, kept = written(), tmp_path / "paper.table"
+    assert run(place, "--store", tmp_path / "one", "--table", kept) == 0
+    assert kept.read_bytes().startswith(b"tadtable")
+    assert run(place, "--store", tmp_path / "two", "--table", kept) == 0
+    one, two = (tadcore.load_study(tmp_path / name) for name in ("one", "two"))
+    assert one.time.tolist() == two.time.tolist()
+
+
 def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path):
     place = written(FILE.replace("trials = 300", f"trials = {300 * CHUNK}"))
     ours, theirs = pty.openpty()

@@ -43,9 +43,7 @@ def test_the_riccati_flow_is_the_printed_one(seed, n, interaction):
 def test_a_random_equilibrium_is_one(seed, n, interaction):
     _, _, sc = drawn(seed, interaction, n)
     report = v.check_equilibrium(sc)
-    assert all(check.ok for check in report if "regret" not in check.name), report
-    # a game that expands amplifies rounding: its regret may be undecided, but is never wrongly refused
-    assert all(check.accepted or not check.converged for check in report), report
+    assert report.ok, report
 
 
 @given(seed=SEEDS, n=st.integers(1, 3), interaction=st.sampled_from(["I1", "I2"]))

@@ -20,7 +20,10 @@ def play(name, **changes):
 
 
 def placed(name, positions):
-    sc = tadcore.scenarios.load(name)
+    return moved_to(tadcore.scenarios.load(name), positions)
+
+
+def moved_to(sc, positions):
     names = [*(f"defenders[{i}]" for i in range(sc.n)), "target", "attacker"]
     return sc.replace({f"{p}.position": x for p, x in zip(names, positions, strict=True)})
 
@@ -219,6 +222,55 @@ def test_a_chattering_game_slides_and_the_grid_converges_to_it():
     assert changes[1] > 1.8 * changes[0]  # how often it flips is a property of δ
     assert changes[2] > 1.8 * changes[1]
     assert any("d1→d2 chatters" in note for note in v.check_steps(run).notes)
+
+
+def test_the_sliding_mode_is_the_limit_of_the_chattering():
+    sc = placed("paper-i1", CHATTERS).replace(step=0.01)
+    study = v.sliding_study(sc)
+    (slide,) = study.play.slides
+    assert slide.edges == (("d1", "d2"),)
+    begins, ends = (event.time for event in study.play.events if "slid" in event.kind)
+    assert (slide.start, slide.end) == (begins, ends)
+    # Filippov's share against the grid's, which only counts: all errors are of the order of δ
+    for found, exact in ((study.share, slide.share), (study.start, slide.start), (study.end, slide.end)):
+        assert (np.abs(found[0] - exact) < 2.5 * study.steps).all(), found
+    assert np.allclose(study.drift[0, :-1] / study.drift[0, 1:], 2.0, atol=0.1)  # the distance tends to ζ, at order 1
+    assert (study.flips[0, 1:] > 1.8 * study.flips[0, :-1]).all()  # and the flips to infinity
+    assert np.abs(study.ends - study.play.outcome.time).max() < 0.01
+    text = repr(study)
+    assert "d1→d2: slides from 1.2199 to 1.91186" in text
+    assert "δ = 0.00125" in text
+
+
+def test_a_run_says_that_it_chatters():
+    run = tadcore.simulate(placed("paper-i1", CHATTERS))
+    assert run.chattering == v.chatter(run)
+    assert [c.edge for c in run.chattering] == [("d1", "d2")]
+    assert repr(run).endswith("network changes, chattering: d1→d2)")
+    assert "\n" not in repr(run)
+    quiet = play("paper-i1")
+    assert quiet.chattering == ()
+    assert "chatter" not in repr(quiet)
+
+
+def test_two_who_see_each_other_across_one_circle_slide_as_one():
+    rng = np.random.default_rng(0)
+    sc = tadcore.scenarios.load("paper-i1").replace(
+        {f"defenders[{i}].visibility_radius": 2.0 for i in range(3)} | {"step": 0.02}
+    )
+    met = 0
+    for _ in range(12):
+        at = moved_to(sc, rng.uniform(-2.5, 2.5, (5, 2)))
+        play = v.play_by_events(at)
+        for event in play.events:
+            back = (event.edge[1], event.edge[0])
+            if "attacker" not in back and "target" not in back:
+                assert any(e.time == event.time and e.kind == event.kind and e.edge == back for e in play.events)
+        met += sum(len(slide.edges) == 2 for slide in play.slides)
+        for slide in play.slides:
+            assert 0.0 <= slide.share <= 1.0
+            assert slide.start <= slide.end
+    assert met  # this happens
 
 
 def test_a_game_over_at_once_has_no_events():

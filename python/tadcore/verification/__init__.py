@@ -5,14 +5,16 @@
 ==========================  =====================================================================================
 room                        what it answers
 ==========================  =====================================================================================
-``fne``                     does P solve its Riccati equation, and does anyone gain by deviating (thm:fbne,
+``fne``, ``responses``      does P solve its Riccati equation, and does anyone gain by deviating (thm:fbne,
                             thm:zero:sum:game)
 ``adapted``, ``nafne``      S, ΔQ^Ad, the indices J^Ad in continuous time and their identities (thm:thm1, thm:thm2)
 ``record``                  is the record what the equations say
 ``consistency``             full sight gives the equilibrium (thm:consistency); how far the indices are from the own
 ``gains``, ``objective``    gradient, curvature in full blocks, other starts, how often certificates hold
+``bounds``                  a lower bound on Θ by semidefinite programming, and the gap (extra ``bounds``)
 ``geometry``                straight line (thm:straight_line), radius delay (thm:delayproperty), symmetries
-``steps``, ``events``       δ, δ/2, δ/4; chattering; the continuous game by its event times, sliding modes included
+``steps``                   δ, δ/2, δ/4: what depends on the step
+``events``, ``sliding``     the continuous game by its event times, sliding modes included; how chattering tends to them
 ``externality``             the jump of every player's control at every change of the network
 ``decentral``               the synthesis as a protocol between players (rem:networkexternality)
 ==========================  =====================================================================================
@@ -24,23 +26,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tadcore._chatter import Chatter, chatter
 from tadcore.equilibrium import solve_equilibrium
 from tadcore.errors import ScenarioError, VerificationError
 from tadcore.simulation import Run, simulate
 
 from .adapted import Adapted, Deviation, Index
+from .bounds import ThetaBound, require_clarabel, theta_bound
 from .consistency import check_consistency, index_distance
 from .decentral import Decentralised, check_decentral, decentralise
-from .events import Event, EventPlay, play_by_events
+from .events import play_by_events
 from .externality import control_jumps
-from .fne import BestResponse, best_responses, check_equilibrium, riccati_defect
+from .fne import check_equilibrium, riccati_defect
 from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
 from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
 from .indices import AdaptedWeights, adapted_weights
 from .nafne import check_nafne, gap_order, sampling_gap
+from .plays import Event, EventPlay, Slide
 from .record import check_record
 from .report import Check, Measurement, VerificationReport, combine
-from .steps import Chatter, Refinement, StepStudy, chatter, check_steps, refine_batch, step_study
+from .responses import BestResponse, best_responses
+from .sliding import SlidingStudy, sliding_study
+from .steps import Refinement, StepStudy, check_steps, refine_batch, step_study
 
 if TYPE_CHECKING:
     from tadcore.scenario import Scenario
@@ -59,7 +66,10 @@ __all__ = [
     "Index",
     "Measurement",
     "Refinement",
+    "Slide",
+    "SlidingStudy",
     "StepStudy",
+    "ThetaBound",
     "VerificationError",
     "VerificationReport",
     "adapted_weights",
@@ -88,13 +98,21 @@ __all__ = [
     "relabelled",
     "riccati_defect",
     "sampling_gap",
+    "sliding_study",
     "step_study",
+    "theta_bound",
     "verify",
 ]
 
 
 def verify(
-    sc_or_run: Scenario | Run, *, deviations: int = 2, instants: int = 20, starts: int = 0, seed: int = 0
+    sc_or_run: Scenario | Run,
+    *,
+    deviations: int = 2,
+    instants: int = 20,
+    starts: int = 0,
+    seed: int = 0,
+    bound: bool = False,
 ) -> VerificationReport:
     """Check the paper's theorems on a scenario or on a run.
 
@@ -110,6 +128,8 @@ def verify(
         Random starts at each of those instants; none by default, since they take seconds.
     seed : int
         Key of the deviations and the starts.
+    bound : bool
+        Whether to bound Θ from below at those instants and report the gap; needs Clarabel, the extra ``bounds``.
 
     Returns
     -------
@@ -121,7 +141,8 @@ def verify(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     ScenarioError
-        The argument is neither a scenario nor a run.
+        The argument is neither a scenario nor a run, or a run with hysteresis or dwell, or a bound is asked for and
+        Clarabel is not installed.
 
     Examples
     --------
@@ -136,6 +157,10 @@ def verify(
 
     if not isinstance(sc_or_run, Scenario | Run):
         raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")
+    if bound:
+        require_clarabel()
+    if isinstance(sc_or_run, Run) and sc_or_run.variant:
+        raise ScenarioError("sc_or_run", f"a run with {sc_or_run.variant}", "a run of the paper's game, without either")
     run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run
     equilibrium = solve_equilibrium(run.scenario)
     title = f"{run.scenario.interaction}: {run.outcome}"
@@ -147,7 +172,7 @@ def verify(
         check_record(run, equilibrium),
         check_nafne(run, equilibrium, deviations=deviations, seed=seed),
         check_consistency(run, equilibrium),
-        check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed),
+        check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed, bound=bound),
         check_geometry(run, seed=seed),
         check_decentral(run),
         check_steps(run),

@@ -10,141 +10,33 @@ graze is not missed), then found by Brent's method. The network changes there an
 
 Where an edge would break at once after it formed and form at once after it broke, f'_on > 0 > f'_off, the game slides
 along the circle: by Filippov's rule with αC_on + (1 - α)C_off, α = f'_off / (f'_off - f'_on), until α leaves [0, 1].
-Two edges sliding at once have no unique continuation: the play then stops and says so.
+Two players of one radius see each other across the same circle and their edges slide as one. Two circles at once have
+no unique continuation: the play then stops and says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from tadcore.equilibrium import solve_equilibrium
 from tadcore.network import Edge, VisibilityNetwork, edges_of
 from tadcore.outcome import Outcome, OutcomeKind
-from tadcore.synthesis import synthesize
 
-from ._matrices import Floats, matrices_of
+from ._circles import Circles, Loops, flow
+from ._matrices import Floats
+from .plays import Event, EventPlay, Slide
 
 if TYPE_CHECKING:
     from tadcore.scenario import Scenario
 
-__all__ = ["Event", "EventPlay", "play_by_events"]
+__all__ = ["play_by_events"]
 
 _PARTS = 4
-_DEGREE = 16
 _EVENTS_PER_STEP = 40
 _ROOT = 1e-13
-
-
-@dataclass(frozen=True)
-class Event:
-    """One change of the network in continuous time.
-
-    Attributes
-    ----------
-    time : float
-        When.
-    edge : tuple of str
-        Who sees whom.
-    kind : {"formed", "broke", "slides", "stops sliding"}
-        What happened to it.
-    """
-
-    time: float
-    edge: Edge
-    kind: str
-
-
-@dataclass(frozen=True, eq=False)
-class EventPlay:
-    """A game played from event to event; made by `play_by_events`.
-
-    Attributes
-    ----------
-    outcome : Outcome or None
-        How it ended; None where it could not be continued.
-    events : tuple of Event
-        Every change of the network, in order of time.
-    resolved : bool
-        False where two edges would slide at once, or a step holds more events than are followed.
-    position : ndarray, shape (N, dim)
-        z at the end.
-    """
-
-    outcome: Outcome | None
-    events: tuple[Event, ...]
-    resolved: bool
-    position: Floats = field(repr=False)
-
-    @property
-    def times(self) -> tuple[float, ...]:
-        """Times at which an edge forms, breaks or begins to slide."""
-        return tuple(event.time for event in self.events if event.kind != "stops sliding")
-
-
-class _Loops:
-    """C on a step by network: the mean of the closed loops at both ends."""
-
-    def __init__(self, sc: Scenario) -> None:
-        self.sc, self.m = sc, matrices_of(sc)
-        self.rows = self.m.rows(self.m.values(solve_equilibrium(sc).P))
-        self.kept: dict[tuple[int, bytes], Floats] = {}
-
-    def __call__(self, k: int, network: NDArray[np.bool_]) -> Floats:
-        key = (k, network.tobytes())
-        if key not in self.kept:
-            rows = 0.5 * (self.rows[k] + self.rows[k + 1])
-            ends = [synthesize(self.sc, step=i, adjacency=network).rows for i in (k, k + 1)]
-            rows[: len(network)] = 0.5 * (ends[0] + ends[1])
-            self.kept[key] = self.m.B @ rows
-        return self.kept[key]
-
-
-class _Circles:
-    """The circles of one game: who is watched from where, and at which radius."""
-
-    def __init__(self, sc: Scenario) -> None:
-        m, size = len(sc.constrained), sc.n + 1
-        pairs = [(i, j) for i in range(m) for j in range(size) if np.isfinite(sc.visibility_radii[i])]
-        self.pairs = pairs
-        self.capture = [(i, float(sc.capture_radii[i])) for i in range(size)]
-        # one row for each circle: w = row @ z; the own column of 𝒜 stands for the attacker, at the origin
-        self.rows = np.zeros((len(pairs) + size, size))
-        for s, (i, j) in enumerate(pairs):
-            self.rows[s, i] = 1.0
-            if i != j:
-                self.rows[s, j] = -1.0
-        self.rows[len(pairs) :] = np.eye(size)
-        sight = [sc.visibility_radii[i] for i, _ in pairs]
-        self.square = np.array([*sight, *sc.capture_radii]) ** 2
-
-    def values(self, z: Floats) -> Floats:
-        """F of every circle."""
-        w = self.rows @ z
-        values: Floats = np.sum(w * w, axis=1) - self.square
-        return values
-
-    def slopes(self, z: Floats, C: Floats) -> Floats:
-        """F' of every circle under ż = Cz."""
-        slopes: Floats = 2.0 * np.sum((self.rows @ z) * (self.rows @ (C @ z)), axis=1)
-        return slopes
-
-
-def _flow(C: Floats, z: Floats, h: float) -> Callable[[float], Floats]:
-    """exp(Cs)z as a function of s in [0, h]: its Taylor series, or the exponential where that is too long."""
-    if np.abs(C).sum(axis=1).max() * h > 0.5:
-        return lambda s: np.asarray(expm(C * s) @ z)
-    terms = [z]
-    for j in range(1, _DEGREE):
-        terms.append(C @ terms[-1] / j)
-    series, powers = np.stack(terms), np.arange(_DEGREE)
-    return lambda s: np.tensordot(s**powers, series, axes=1)
 
 
 def play_by_events(sc: Scenario) -> EventPlay:
@@ -179,12 +71,14 @@ class _Play:
     """The state of one play: z, network, and the edge that slides, if any."""
 
     def __init__(self, sc: Scenario) -> None:
-        self.sc, self.loops, self.circles = sc, _Loops(sc), _Circles(sc)
+        self.sc, self.loops, self.circles = sc, Loops(sc), Circles(sc)
         self.z = sc.positions[:-1] - sc.positions[-1]
         self.network = VisibilityNetwork.from_positions(sc).adjacency.copy()
         self.sliding: int | None = None
+        self.began, self.shown = 0.0, 0.0  # of the slide under way: its start, and ∫α
         self.events: list[Event] = []
-        self.first = len(self.circles.pairs)
+        self.slides: list[Slide] = []
+        self.first = len(self.circles.edges)
 
     def run(self) -> EventPlay:
         """From t = 0 to the end."""
@@ -203,22 +97,40 @@ class _Play:
                 if circle >= self.first:
                     return self._end(time, circle - self.first)
                 if not self._switch(k, circle, time):
-                    return EventPlay(None, tuple(self.events), False, self.z)
+                    return self._stop(time)
             else:
-                return EventPlay(None, tuple(self.events), False, self.z)
+                return self._stop(k * step + done)
         return self._end(sc.horizon, None)
 
     def _end(self, time: float, who: int | None) -> EventPlay:
         n = self.sc.n
         kind = OutcomeKind.TIMEOUT if who is None else OutcomeKind.INTERCEPTED if who < n else OutcomeKind.CAPTURED
         defender = who if who is not None and who < n else -1
-        return EventPlay(Outcome.of(kind, defender, time), tuple(self.events), True, self.z)
+        self._close(time)
+        return EventPlay(Outcome.of(kind, defender, time), tuple(self.events), True, tuple(self.slides), self.z)
+
+    def _stop(self, time: float) -> EventPlay:
+        self._close(time)
+        return EventPlay(None, tuple(self.events), False, tuple(self.slides), self.z)
+
+    def _close(self, time: float) -> None:
+        """Note the slide under way, if any, as over."""
+        if self.sliding is not None:
+            share = min(self.shown / (time - self.began), 1.0) if time > self.began else 0.5
+            self.slides.append(Slide(self._edges(self.sliding), self.began, time, share))
+            self.sliding = None
+
+    def _edges(self, circle: int) -> tuple[Edge, ...]:
+        """The edges of a circle by name."""
+        single = np.zeros_like(self.network)
+        single[self.circles.where[circle]] = True
+        return edges_of(single, self.sc.players)
 
     def _pair(self, k: int, circle: int) -> tuple[Floats, Floats]:
         """C with and without the edge of a circle."""
-        i, j = self.circles.pairs[circle]
+        where = self.circles.where[circle]
         on, off = self.network.copy(), self.network.copy()
-        on[i, j], off[i, j] = True, False
+        on[where], off[where] = True, False
         return self.loops(k, on), self.loops(k, off)
 
     def _advance(self, k: int, h: float) -> tuple[float, int | None]:
@@ -226,7 +138,7 @@ class _Play:
         if self.sliding is not None:
             return self._slide(k, h, self.sliding)
         C = self.loops(k, self.network)
-        at = _flow(C, self.z, h)
+        at = flow(C, self.z, h)
         nodes = np.linspace(0.0, h, _PARTS + 1)
         z = [at(float(node)) for node in nodes]
         f = self.inside() * np.stack([self.circles.values(x) for x in z])
@@ -244,7 +156,7 @@ class _Play:
 
     def inside(self) -> Floats:
         """The sign of each circle: +1 where its edge exists, so that it breaks outwards, else -1."""
-        signs = [1.0 if self.network[pair] else -1.0 for pair in self.circles.pairs]
+        signs = [1.0 if self.network[pairs[0]] else -1.0 for pairs in self.circles.edges]
         return np.array(signs + [-1.0] * (self.sc.n + 1))
 
     def _crossing(self, at: Callable[[float], Floats], C: Floats, c: int, low: float, high: float) -> float | None:
@@ -275,25 +187,21 @@ class _Play:
 
     def _switch(self, k: int, circle: int, time: float) -> bool:
         """Change an edge, or let it slide; False where the play cannot go on."""
-        pair = self.circles.pairs[circle]
-        single = np.zeros_like(self.network)
-        single[pair] = True
-        (edge,) = edges_of(single, self.sc.players)
-        if self.sliding == circle:  # α left [0, 1]
-            self.sliding = None
-            on, _ = self._pair(k, circle)
-            self.network[pair] = bool(self.circles.slopes(self.z, on)[circle] <= 0)
-            self.events.append(Event(time, edge, "stops sliding"))
-            return True
+        where, edges = self.circles.where[circle], self._edges(circle)
         on, off = self._pair(k, circle)
-        if self.circles.slopes(self.z, on)[circle] > 0 > self.circles.slopes(self.z, off)[circle]:
+        if self.sliding == circle:  # α left [0, 1]
+            self._close(time)
+            self.network[where] = bool(self.circles.slopes(self.z, on)[circle] <= 0)
+            what = "stops sliding"
+        elif self.circles.slopes(self.z, on)[circle] > 0 > self.circles.slopes(self.z, off)[circle]:
             if self.sliding is not None:
                 return False
-            self.sliding = circle
-            self.events.append(Event(time, edge, "slides"))
-            return True
-        self.network[pair] = not self.network[pair]
-        self.events.append(Event(time, edge, "formed" if self.network[pair] else "broke"))
+            self.sliding, self.began, self.shown = circle, time, 0.0
+            what = "slides"
+        else:
+            self.network[where] = not self.network[self.circles.edges[circle][0]]
+            what = "formed" if self.network[self.circles.edges[circle][0]] else "broke"
+        self.events += [Event(time, edge, what) for edge in edges]
         return True
 
     def _slide(self, k: int, h: float, circle: int) -> tuple[float, int | None]:
@@ -327,13 +235,15 @@ class _Play:
             return 0.0, circle
         if margin(h) < 0:
             best, met = float(brentq(margin, 0.0, h, xtol=_ROOT)), circle
-        inside = self.inside()
-        ends = inside * self.circles.values(at(best))
+        inside, reached = self.inside(), best
+        ends = inside * self.circles.values(at(reached))
         starts = inside * self.circles.values(self.z)
         for c in np.flatnonzero((ends > 0) & (starts < 0)).tolist():
             if c != circle:
-                root = float(brentq(lambda s, c=c: inside[c] * self.circles.values(at(s))[c], 0.0, best, xtol=_ROOT))
+                root = float(brentq(lambda s, c=c: inside[c] * self.circles.values(at(s))[c], 0.0, reached, xtol=_ROOT))
                 if root < best or met is None:
                     best, met = root, c
+        share = np.clip([alpha(self.z), alpha(at(0.5 * best)), alpha(at(best))], 0.0, 1.0)  # beyond by rounding only
+        self.shown += best * float(share @ [1.0, 4.0, 1.0]) / 6.0
         self.z = at(best)
         return best, met

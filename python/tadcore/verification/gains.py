@@ -2,11 +2,13 @@
 
 Of three questions the first two have an answer. *Critical?* The gradient (eq:errgradient) at every instant. *A local
 minimum?* The Hessian with every block free, its exact smallest eigenvalue. *The global one?* Where the solver holds a
-certificate it is proved; elsewhere `multistart` looks for something lower and reports what it found.
+certificate it is proved; elsewhere `multistart` looks for something lower and `theta_bound` says how much lower any
+gains could be.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,7 @@ from tadcore.equilibrium import solve_equilibrium
 from tadcore.synthesis import synthesize
 
 from ._matrices import FeedbackSolution, Floats, matrices_of
+from .bounds import ThetaBound, bound_theta, require_clarabel
 from .objective import FullObjective
 from .report import Check, Measurement, VerificationReport
 
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CertificateRates", "certificate_rates", "check_gains", "lowest_curvature", "multistart"]
 
-_GRADIENT, _CURVATURE, _LOWER = 1e-9, 1e-9, 1e-8
+_GRADIENT, _CURVATURE, _LOWER, _BELOW = 1e-9, 1e-9, 1e-8, 1e-10
 _DENSE = 400
 
 
@@ -63,7 +66,13 @@ def multistart(objective: FullObjective, x: Floats, starts: int, rng: np.random.
 
 
 def check_gains(
-    run: Run, equilibrium: FeedbackSolution, *, instants: int = 20, starts: int = 0, seed: int = 0
+    run: Run,
+    equilibrium: FeedbackSolution,
+    *,
+    instants: int = 20,
+    starts: int = 0,
+    seed: int = 0,
+    bound: bool = False,
 ) -> VerificationReport:
     """Check that the gains of a run minimise Θ.
 
@@ -79,12 +88,22 @@ def check_gains(
         Random starts at each of those instants; none by default, since they take seconds.
     seed : int
         Key of the starts.
+    bound : bool
+        Whether to bound Θ from below at each of those instants; needs the extra ``bounds``.
 
     Returns
     -------
     VerificationReport
-        Solver status, gradients at every instant, curvature in full blocks, and what random starts found.
+        Solver status, gradients at every instant, curvature in full blocks, what random starts found, and the gap to
+        the lower bound.
+
+    Raises
+    ------
+    ScenarioError
+        A bound is asked for and Clarabel is not installed.
     """
+    if bound:
+        require_clarabel()
     sc, length = run.scenario, len(run.times) - 1
     m = matrices_of(sc)
     values = m.values(equilibrium.P)
@@ -125,14 +144,33 @@ def check_gains(
         detail = f"smallest over largest {flattest:.2g}, {len(chosen)} instants"
         checks.append(Check("gains.curvature", value, _CURVATURE, True, remedy, label, detail))
     if starts:
-        remedy = "a random start went lower: a worse minimum was taken there; report this scenario"
+        remedy = "a start in full blocks went lower: blocks that turn do better there, or a worse minimum was taken"
         where = f"{starts} starts at each of {len(chosen)} instants" + (
             f", t = {run.times[where_lower]:.6g}" if worst else ""
         )
         checks.append(Check("gains.multistart", worst, _LOWER, True, remedy, label, where))
     share = run.certified / len(run.times)
     measured = [Measurement("gains.certified", share, "share of rows whose gains are proved globally optimal")]
+    if bound:
+        bounds = [
+            bound_theta(FullObjective(sc, m, values[:, k], run.adjacency[k], dim=1), float(run.theta[k]))
+            for k in chosen.tolist()
+        ]
+        checks.append(_below(bounds, label))
+        widest = max(bounds, key=lambda b: b.relative_gap)
+        found = f"largest (Θ - lower bound)/Θ of {len(bounds)} instants, {sum(b.tight for b in bounds)} of them tight"
+        meaning = f"{found}; there Θ = {widest.theta:.6g}, gap {widest.gap:.3g}"
+        measured.append(Measurement("gains.gap", max(widest.relative_gap, 0.0), meaning))
     return VerificationReport("gains", tuple(checks), tuple(measured))
+
+
+def _below(bounds: Sequence[ThetaBound], label: str) -> Check:
+    """Whether no bound lies above the Θ recorded: one that does is wrong, or the Θ is."""
+    above = max(-b.gap / max(b.scale, 1e-300) for b in bounds)
+    remedy = "Θ lies below a proved lower bound: Θ is not that of gains which the network allows"
+    ended = sorted({b.status for b in bounds})
+    usable = all(np.isfinite(b.value) for b in bounds)
+    return Check("gains.bound", max(above, 0.0), _BELOW, usable, remedy, label, f"solver: {', '.join(ended)}")
 
 
 def _instants(run: Run, most: int) -> NDArray[np.int_]:

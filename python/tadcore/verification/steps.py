@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._arrays import as_index
+from tadcore._chatter import Chatter, chatter
 from tadcore.batch import simulate_batch
-from tadcore.network import Edge, edges_of
 from tadcore.outcome import Outcome
 from tadcore.simulation import simulate
 
@@ -27,31 +27,9 @@ if TYPE_CHECKING:
     from tadcore.scenario import Scenario
     from tadcore.simulation import Run
 
-__all__ = ["Chatter", "Refinement", "StepStudy", "chatter", "check_steps", "refine_batch", "step_study"]
+__all__ = ["Refinement", "StepStudy", "check_steps", "refine_batch", "step_study"]
 
-_FEWEST_FLIPS = 6
-_LONGEST_REST = 5
 _SHOWN = 5
-
-
-@dataclass(frozen=True)
-class Chatter:
-    """A stretch in which one edge flips at almost every instant.
-
-    Attributes
-    ----------
-    edge : tuple of str
-        Who sees whom.
-    start, end : float
-        Instants of the first and the last flip.
-    flips : int
-        How many.
-    """
-
-    edge: Edge
-    start: float
-    end: float
-    flips: int
 
 
 @dataclass(frozen=True)
@@ -110,33 +88,6 @@ class Refinement:
     changed: tuple[float, ...]
     moved: tuple[float, ...]
     undecided: np.ndarray
-
-
-def chatter(run: Run) -> tuple[Chatter, ...]:
-    """Find the stretches of a run in which an edge flips at almost every instant.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-
-    Returns
-    -------
-    tuple of Chatter
-        Stretches of at least six flips of one edge, never more than five steps apart, in order of time.
-    """
-    length = len(run.times) - 1
-    flips = run.adjacency[1:length] != run.adjacency[: length - 1]
-    found = []
-    for i, j in np.argwhere(flips.any(axis=0)).tolist():
-        at = np.flatnonzero(flips[:, i, j]) + 1
-        single = np.zeros(run.adjacency.shape[1:], dtype=np.bool_)
-        single[i, j] = True
-        (edge,) = edges_of(single, run.scenario.players)
-        for part in np.split(at, np.flatnonzero(np.diff(at) > _LONGEST_REST) + 1):
-            if len(part) >= _FEWEST_FLIPS:
-                found.append(Chatter(edge, float(run.times[part[0]]), float(run.times[part[-1]]), len(part)))
-    return tuple(sorted(found, key=lambda c: (c.start, c.edge)))
 
 
 def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:

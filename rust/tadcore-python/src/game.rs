@@ -10,7 +10,7 @@ use tadcore::cancel::CancelToken;
 use tadcore::ensemble::{self, Batch};
 use tadcore::error::EquilibriumError;
 use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
-use tadcore::network::Topology;
+use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{self, Setup};
 use tadcore::synthesis::{Method, Options, Synthesizer};
@@ -165,13 +165,16 @@ impl Game {
         Ok(Gains::new(gains, terms, topology))
     }
 
-    /// One recorded run.
+    /// One recorded run; with a hysteresis or a dwell time another game than the paper's.
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0))]
     fn simulate(
         &self,
         py: Python<'_>,
         positions: PyReadonlyArray2<'_, f64>,
         visibility_radii: PyReadonlyArray1<'_, f64>,
         capture_radii: PyReadonlyArray1<'_, f64>,
+        hysteresis: f64,
+        dwell: f64,
     ) -> PyResult<Record> {
         let dim = positions.as_array().ncols();
         let flat: Vec<f64> = positions.as_array().iter().copied().collect();
@@ -179,7 +182,7 @@ impl Game {
         let policy = self.policy(py)?;
         let record = detach::interruptible(py, |cancel| {
             let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
-            simulation::simulate(&policy, &setup, cancel)
+            simulation::simulate_with(&policy, &setup, &EdgeRule { hysteresis, dwell }, cancel)
         })?
         .map_err(|error| errors::run(py, &self.game, error))?;
         Ok(Record::new(policy, record))

@@ -77,9 +77,32 @@ def transition(rows, step):
     return expm(C * step)
 
 
-def simulate(game, start, gains=None):
-    """Play the game once from `start`."""
+class Remembering:
+    """Edges with hysteresis and a dwell time, kept as the full history of every edge."""
+
+    def __init__(self, zeta, hysteresis, dwell, step):
+        self.zeta, self.band, self.dwell, self.step = zeta, hysteresis, dwell, step
+        self.history = []
+
+    def __call__(self, positions):
+        near = adjacency(positions, self.zeta)
+        if self.history:
+            wide = adjacency(positions, self.zeta + self.band)
+            past = np.array(self.history)
+            near = np.where(past[-1], wide, near)
+            now = len(past)
+            for i, j in np.ndindex(near.shape):
+                changes = [k for k in range(1, now) if past[k, i, j] != past[k - 1, i, j]]
+                if changes and (now - changes[-1]) * self.step < self.dwell - 1e-9:
+                    near[i, j] = past[-1, i, j]
+        self.history.append(near)
+        return near
+
+
+def simulate(game, start, gains=None, look=None):
+    """Play the game once from `start`; `look` gives the network of positions, the paper's rule by default."""
     gains = gains or Gains(game)
+    look = look or (lambda positions: adjacency(positions, start.zeta))
     positions = np.array(start.positions, dtype=float)
     run = Run()
     for k in range(game.steps + 1):
@@ -93,7 +116,7 @@ def simulate(game, start, gains=None):
             break
         if k == game.steps:
             break
-        A = adjacency(positions, start.zeta)
+        A = look(positions)
         gap = np.abs(distances(positions)[: game.m] - start.zeta[:, None])
         run.margin = min(run.margin, np.min(gap[np.isfinite(gap)], initial=np.inf))
         if not run.networks or np.any(run.networks[-1] != A):

@@ -5,12 +5,15 @@
 //! | 𝒜 | [`Topology`] | augmented adjacency: row i, entry j ≠ i player j, entry i the attacker (eq:extadj) |
 //! | ζ_i | `radius` of [`squared_reach`] | visibility radius |
 //! | 𝓘_i | [`information_matrix`] | what player i observes of z (eq:infomatrix), reduced: without ⊗ **I** |
+//! | h, D | [`EdgeRule`] | hysteresis and dwell time: a variant, not the paper's |
 //!
 //! Player i may use z_i when it sees the attacker, and z_j − z_i for each j that it sees: the row space of 𝓘_i.
 
+mod memory;
 mod topology;
 mod visibility;
 
+pub use memory::{EdgeRule, Memory};
 pub use topology::Topology;
 pub use visibility::{observe, squared_distance, squared_norm, squared_reach};
 

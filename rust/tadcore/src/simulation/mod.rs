@@ -14,5 +14,5 @@ mod setup;
 
 pub use outcome::{Outcome, Reach, distance, relative_state};
 pub(crate) use record::apply;
-pub use record::{Record, simulate};
+pub use record::{Record, simulate, simulate_with};
 pub use setup::Setup;

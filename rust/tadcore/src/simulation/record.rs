@@ -5,7 +5,7 @@ use super::setup::Setup;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::validation::BEYOND;
-use crate::network::{Topology, observe, squared_reach};
+use crate::network::{EdgeRule, Memory, Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
 
@@ -46,7 +46,21 @@ pub struct Record {
 /// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision, or when
 /// the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
+    simulate_with(policy, setup, &EdgeRule::PAPER, cancel)
+}
+
+/// The same with edges that remember, unless `rule` is the paper's.
+///
+/// # Errors
+/// [`RunError`] for positions, radii or a rule that cannot be accepted, or when the caller cancelled.
+pub fn simulate_with(
+    policy: &Policy,
+    setup: &Setup,
+    rule: &EdgeRule,
+    cancel: &CancelToken,
+) -> Result<Record, RunError> {
     setup.check(policy.game())?;
+    rule.check()?;
     let game = policy.game();
     let (n, size, m, dim) = (game.n(), game.size(), game.constrained(), setup.dim);
     let reach = Reach::new(setup.capture);
@@ -55,6 +69,7 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
     relative_state(setup.positions, dim, &mut z);
     let mut attacker = setup.positions[(n + 1) * dim..].to_vec();
     let mut topology = Topology::empty(m, size);
+    let mut memory = (*rule != EdgeRule::PAPER).then(|| Memory::new(rule, setup.visibility, size, game.grid().step()));
     let mut solver = Synthesizer::new();
     let mut record = Record {
         outcome: Outcome::Timeout,
@@ -76,7 +91,10 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
         cancel.check()?;
         let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
         if end.is_none() || k == 0 {
-            observe(&z, dim, &sight, &mut topology);
+            match &mut memory {
+                None => observe(&z, dim, &sight, &mut topology),
+                Some(memory) => memory.observe(k, &z, dim, &sight, &mut topology),
+            }
         }
         let step = policy.at(k, &topology, &mut solver);
         record.push(policy, k, &z, &attacker, &topology, &step);
