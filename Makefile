@@ -10,7 +10,7 @@ STAMP  := $(VENV)/.installed
 RUST   := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python lint format bench peers docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python lint format bench peers images docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -57,6 +57,9 @@ bench:  ## Criterion benchmarks of the core
 peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process run each
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
+
+images: $(STAMP)  ## draw again the pictures that tests compare with, and the same with letters into out/images
+	$(BIN)/python -m pytest -q tests/python/test_images.py --mpl-generate-path=tests/python/baseline
 
 docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; warnings are errors
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked

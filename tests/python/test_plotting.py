@@ -162,6 +162,19 @@ def test_theta_of_a_game_seen_whole_is_zero_not_rounding(runs):
     assert np.nanmin(limited.lines[0].get_ydata()) > 1e-6
 
 
+@pytest.mark.parametrize("case", ["paper-i1", "paper-i2"])
+@pytest.mark.parametrize("styled", [False, True])
+def test_the_legend_of_theta_leaves_the_axes_their_width(runs, case, styled):
+    with plotting.style() if styled else contextlib.nullcontext():
+        ax = plotting.theta(runs[case])
+        drawn(ax.figure)
+    assert ax.bbox.width > 0.7 * ax.figure.bbox.width
+    legend = ax.get_legend().get_window_extent()
+    assert ax.figure.bbox.x0 <= legend.x0
+    assert legend.x1 <= ax.figure.bbox.x1
+    ax.figure.clear()
+
+
 def test_a_restless_network_is_thinned_and_says_so(restless):
     figure, ax = agg_figure()
     plotting.controls(restless, ax=ax)

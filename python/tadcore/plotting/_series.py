@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._axes import above, new_axes
 from ._ends import label_ends
-from ._style import COLUMN, look, new_axes, note, players
+from ._style import COLUMN, look, note, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,10 +168,7 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
             label=name,
         )
         lines.append(line)
-    ax.legend(
-        handles=lines, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(lines), frameon=False,
-        columnspacing=1.0, handlelength=1.8, handletextpad=0.4, borderaxespad=0.2,
-    )  # fmt: skip
+    above(ax, lines)
     quiet = times[np.flatnonzero(total > 1e-12 * scale)[-1]]
     if times[-1] - quiet > 0.15 * times[-1]:
         middle = 0.5 * (quiet + times[-1])

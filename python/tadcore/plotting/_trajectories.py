@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._axes import new_axes
 from ._inset import crowd, magnify
 from ._labels import Labels
 from ._paths import disc, name_runs, paths, positions
-from ._style import COLUMN, edge_text, look, new_axes, note, outcome_text, players
+from ._style import COLUMN, edge_text, look, note, outcome_text, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
