@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.legend import Legend
 
+_WIDTH = 0.84  # of the figure, that a legend above may take
 
 def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
     """Return ``ax``, or the axes of a new figure of this size in inches."""
@@ -60,7 +61,7 @@ def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **opt
     share = len(place.colspan) / place.get_gridspec().ncols if place is not None else 1.0
     for rows in range(-(-len(handles) // most), len(handles) + 1):
         legend = ax.legend(handles=list(handles), ncols=-(-len(handles) // rows), **{**settings, **options})
-        # one that is wider takes its width from the axes, and leaves them nothing
-        if legend.get_window_extent().width <= share * figure.bbox.width:
+        # one that is wider takes its width from the axes: it is centred on them, and they stand right of the middle
+        if legend.get_window_extent().width <= _WIDTH * share * figure.bbox.width:
             break
     return legend
