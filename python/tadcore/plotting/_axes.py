@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _WIDTH = 0.825  # of the figure, that a legend above may take
 
+
 def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
     """Return ``ax``, or the axes of a new figure of this size in inches."""
     if ax is not None:
