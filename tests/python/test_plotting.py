@@ -148,8 +148,13 @@ def test_controls_mark_every_network_change(runs):
 def test_controls_of_chosen_players(runs):
     ax = plotting.controls(runs["paper-i2"], "y", players=["target", "attacker"], ax=agg_figure()[1], changes=False)
     assert len(ax.lines) == 2
+    assert len(plotting.controls(runs["paper-i2"], players="d2", ax=agg_figure()[1], changes=False).lines) == 1
     with pytest.raises(ValueError, match="no player 'd9'"):
         plotting.controls(runs["paper-i2"], players=["d9"], ax=agg_figure()[1])
+    with pytest.raises(ValueError, match="axis: got 'z', must be one of x, y"):
+        plotting.controls(runs["paper-i2"], "z", ax=agg_figure()[1])
+    with pytest.raises(ValueError, match="axis: got 'z', must be one of x, y"):
+        plotting.compare(runs["paper-i2"], runs["paper-i2"], what="controls", axis="z", ax=agg_figure()[1])
 
 
 def test_theta_of_a_game_seen_whole_is_zero_not_rounding(runs):

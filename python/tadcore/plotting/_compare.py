@@ -9,7 +9,7 @@ import numpy as np
 from ._axes import new_axes
 from ._ends import label_ends
 from ._paths import LAID_UNDER, name_runs
-from ._series import span
+from ._series import known_axis, span
 from ._style import COLUMN, look, outcome_text
 from ._trajectories import trajectories
 
@@ -63,6 +63,8 @@ def compare(
         return trajectories(run_a, ax, full=run_b, names=names)
     if what not in ("controls", "distances"):
         raise ValueError(f'what: got {what!r}, must be "trajectories", "controls" or "distances"')
+    if what == "controls":
+        known_axis(run_a, axis)
     ax = new_axes(ax, COLUMN, 2.5)
     shown = run_a.scenario.constrained if what == "controls" else run_a.scenario.players[:-1]
     last = max(run_a, run_b, key=lambda run: run.times[-1])  # names stand at the frame, where this one's curves end
