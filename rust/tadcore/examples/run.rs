@@ -27,7 +27,7 @@ fn gained(now: &Topology, before: &Topology, n: usize) -> Vec<String> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let game = bank::paper_game(Interaction::I1, 1.0)?;
-    let (n, grid) = (game.n(), game.grid().clone());
+    let (n, grid) = (game.n(), *game.grid());
     let start = bank::paper_i1_limited();
     let positions = start.positions.concat();
     let setup = Setup { dim: 2, positions: &positions, visibility: &start.visibility, capture: &start.capture };
