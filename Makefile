@@ -2,15 +2,17 @@
 #
 # Everything Python happens in .venv; Rust builds land in target/. Both are made on first use.
 
-PYTHON ?= python3
-VENV   := .venv
-BIN    := $(VENV)/bin
-OUT    ?= out
-STAMP  := $(VENV)/.installed
-RUST   := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+PYTHON  ?= python3
+VENV    := .venv
+BIN     := $(VENV)/bin
+OUT     ?= out
+STAMP   := $(VENV)/.installed
+RUSTDOC := -D warnings --html-in-header $(CURDIR)/rust/tadcore/katex.html
+RUST    := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python heavy faults fuzz audit lint format bench peers docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python heavy faults fuzz audit lint format bench peers images docs wheel sdist \
+        check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -61,7 +63,7 @@ lint: $(STAMP)  ## format check, clippy, rustdoc, ruff, mypy: warnings are error
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	cargo clippy --workspace --all-targets --locked -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+	RUSTDOCFLAGS="$(RUSTDOC)" cargo doc --workspace --no-deps --locked --quiet
 	$(BIN)/mypy
 
 format:  ## rewrite sources in the project's format
@@ -76,19 +78,26 @@ peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
+images: $(STAMP)  ## draw again the pictures that tests compare with, and the same with letters into out/images
+	$(BIN)/python -m pytest -q tests/python/test_images.py --mpl-generate-path=tests/python/baseline
+
 docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; warnings are errors
-	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+	RUSTDOCFLAGS="$(RUSTDOC)" cargo doc --workspace --no-deps --locked
 	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	$(BIN)/python docs/check_links.py docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
-wheel: $(STAMP)  ## one wheel for every Python from 3.11 on, into dist/
-	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2'
-	$(BIN)/maturin build --release --locked --strip --out dist
+# On Linux zig links against the glibc of 2012, so that the wheel runs wherever NumPy's does; plain rustc would ask for
+# the glibc of this machine.
+ZIG := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux2014)
+
+wheel: $(STAMP)  ## one wheel for every Python from 3.11 on (Linux: glibc 2.17 or later), into dist/
+	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --locked --strip $(ZIG) --out dist
 
 sdist: $(STAMP)  ## the sources as one archive, into dist/
-	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2'
+	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
 	$(BIN)/maturin sdist --out dist
 
 check: lint test  ## everything that must pass before a change lands

@@ -21,7 +21,7 @@ def add_explore(app: typer.Typer, load: Callable[[str], Scenario]) -> None:
     @app.command(short_help="Drag players and radii on a page in the browser.")
     def explore(
         scenario: Annotated[
-            str, typer.Argument(metavar="[SCENARIO]", help="A TOML file, or the name of a bundled scenario.")
+            str, typer.Argument(metavar="SCENARIO", help="A TOML file, or the name of a bundled scenario.")
         ] = "paper-i1",
         port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 takes a free one.")] = 0,
         browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,

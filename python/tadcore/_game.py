@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from .errors import ScenarioError
 from .scenario import Scenario
 
 _KEPT = 8
@@ -21,9 +22,16 @@ _games: OrderedDict[Hashable, _core.Game] = OrderedDict()
 _lock = threading.Lock()
 
 
+def as_scenario(sc: object) -> Scenario:
+    """Return ``sc``, or say what was given in the place of a scenario."""
+    if not isinstance(sc, Scenario):
+        raise ScenarioError("scenario", sc, "a Scenario: Scenario.from_toml(path) reads one, scenarios.load(name) too")
+    return sc
+
+
 def game_of(sc: Scenario) -> _core.Game:
     """The compiled game of a scenario, from a small cache keyed on its weights, horizon and grid."""
-    arguments = _arguments(sc)
+    arguments = _arguments(as_scenario(sc))
     key = tuple(arguments.items())
     with _lock:
         game = _games.get(key)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import as_index, as_positions, as_real, refuse_where
-from ._game import game_of
+from ._game import as_scenario, game_of
 from .errors import ScenarioError
 from .outcome import Outcome, OutcomeKind
 
@@ -109,6 +109,7 @@ def simulate_batch(
     >>> print(batch[1])
     d1 intercepts the attacker at t = 1.395
     """
+    as_scenario(sc)
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
     sight = _visibility(sc, visibility_radii, len(starts))
     capture = _capture(sc, capture_radii, len(starts))

@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 
+import tadcore
 from tadcore import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
 
 
@@ -82,3 +83,13 @@ def test_faults_of_stores_and_workers_say_what_to_do_and_travel(error, text):
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is type(error)
     assert vars(again) == vars(error)
+
+
+@pytest.mark.parametrize(
+    "call", [tadcore.simulate, tadcore.solve_equilibrium, lambda sc: tadcore.simulate_batch(sc, [])]
+)
+def test_a_file_name_is_no_scenario(call):
+    with pytest.raises(
+        tadcore.ScenarioError, match=r"scenario: got 'my\.toml', must be a Scenario: Scenario\.from_toml"
+    ):
+        call("my.toml")

@@ -23,6 +23,7 @@ from bokeh.models import PointDrawTool  # noqa: E402
 
 from tadcore.cli import main  # noqa: E402
 from tadcore.explorer import Explorer, Page  # noqa: E402
+from tadcore.explorer._pointer import Pointer  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -59,7 +60,12 @@ def test_dragging_a_start_plays_the_game_from_there(page):
     before = page.sources["starts"].data
     for x, y in ((1.2, 1.2), (1.5, 0.5), (1.75, -0.5)):
         page.drag(x, y)
-        expected = tadcore.simulate(tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (x, y)}))
+        moved = tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (x, y)})
+        coarse = tadcore.simulate(moved.replace({"step": 0.04}))
+        assert page.status.text == f"<b>{coarse.outcome}</b> (a preview in steps of 0.04)"
+        np.testing.assert_array_equal(paths_of(page)["d2"][-1], coarse.position[-1, 1])
+        page.rest()
+        expected = tadcore.simulate(moved)
         assert page.status.text == f"<b>{expected.outcome}</b>"
         np.testing.assert_array_equal(paths_of(page)["d2"][-1], expected.position[-1, 1])
     assert page.sources["starts"].data is before, "the browser moves what it drags"
@@ -165,14 +171,91 @@ def test_little_is_sent_for_a_drag(page):
     assert numbers < 10_000
 
 
-def test_a_game_in_space_is_refused():
+def test_what_is_dropped_is_the_game_itself(page):
+    page.grab(0.0, 0.0)
+    page.drag(-0.7, 0.4)
+    assert page.explorer.preview
+    page.drop()
+    expected = tadcore.simulate(tadcore.scenarios.load("paper-i1").replace({"defenders[0].position": (-0.7, 0.4)}))
+    assert page.status.text == f"<b>{expected.outcome}</b>"
+    np.testing.assert_array_equal(page.explorer.run.position, expected.position)
+
+
+def test_a_preview_has_a_grid_of_its_own_where_there_is_one():
+    prime = tadcore.scenarios.load("paper-i1").replace({"horizon": 0.505, "step": 0.005})  # 101 steps
+    explorer = Explorer(prime)
+    explorer.move("d1", 0.1, 0.1, preview=True)
+    assert not explorer.preview, "the game itself was played"
+    assert Explorer(prime.replace({"horizon": 0.55})).coarse_step == 0.025
+
+
+def test_waiting_movements_become_one():
+    asked, later = [], []
+
+    class Clock:
+        def add_timeout_callback(self, action, milliseconds):
+            later.append(action)
+            return action
+
+        def remove_timeout_callback(self, action):
+            later.remove(action)
+
+    pointer = Pointer(lambda x, y: asked.append((x, y)), lambda: asked.append("rest"))
+    pointer.document = Clock()
+    for x in range(5):
+        pointer.moved(float(x), 0.0)
+    assert asked == []
+    later.pop()()
+    assert asked == [(4.0, 0.0)]
+    pointer.moved(5.0, 0.0)  # before it rests
+    assert len(later) == 1
+    later.pop()()
+    later.pop()()
+    assert asked == [(4.0, 0.0), (5.0, 0.0), "rest"]
+
+
+@pytest.fixture
+def space():
     data = tadcore.scenarios.load("paper-i1").model_dump()
-    for part in (*data["defenders"], data["target"], data["attacker"]):
-        part["position"] = (*part["position"], 0.0)
-    with pytest.raises(tadcore.ScenarioError, match="scenario: got '3 axes', must be a game in the plane"):
-        Explorer(tadcore.Scenario.model_validate(data))
+    for part, z in zip((*data["defenders"], data["target"], data["attacker"]), (0, 0.5, -0.3, 0.2, 0.8), strict=True):
+        part["position"] = (*part["position"], z)
+    return Page(Explorer(tadcore.Scenario.model_validate(data)))
+
+
+def test_a_game_in_space_is_seen_along_each_axis(space):
+    assert space.planes.labels == ["xy", "xz", "yz"]
+    assert space.planes.visible
+    run = space.explorer.run
+    for i, axes in enumerate(([0, 1], [0, 2], [1, 2])):
+        space.planes.active = i
+        for p, player in enumerate(run.scenario.players):
+            np.testing.assert_array_equal(paths_of(space)[player][-1], run.position[-1, p, axes])
+        assert [space.arena.xaxis[0].axis_label, space.arena.yaxis[0].axis_label] == ["xyz"[axis] for axis in axes]
+    space.grab(1.5, 0.5)  # d2 in the plane yz
+    space.drag(1.25, -0.5)
+    space.drop()
+    assert space.explorer.scenario.defenders[1].position == (1.0, 1.25, -0.5), "x stays"
+    centre = space.explorer.positions[2]
+    space.explorer.stretch("d3", 2.0, 0.0)
+    expected = math.hypot(2.0 - centre[1], 0.0 - centre[2])
+    assert space.explorer.scenario.defenders[2].visibility_radius == pytest.approx(expected, abs=1e-4)
+    assert space.explorer.png()[:4] == b"\x89PNG"
+
+
+def test_one_component_of_the_controls_is_traced(page):
+    page.traces.active = 2
+    run = page.explorer.run
+    assert page.traces.labels == ["speed", "x", "y"]
+    assert page.sources["controls"].data["d3"][0] == run.control[0, 2, 1]
+    assert not page.planes.visible
+
+
+def test_no_such_player_or_plane():
+    explorer = Explorer(tadcore.scenarios.load("paper-i1"))
     with pytest.raises(tadcore.ScenarioError, match="player: got 'd9'"):
-        Explorer(tadcore.scenarios.load("paper-i1")).move("d9", 0.0, 0.0)
+        explorer.move("d9", 0.0, 0.0)
+    with pytest.raises(tadcore.ScenarioError, match="plane: got 'xz', must be one of xy"):
+        explorer.project("xz")
 
 
 def start(*options):
@@ -216,8 +299,11 @@ def test_in_a_real_browser(address, tmp_path):
         view.mouse.down()
         view.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=5)
         view.mouse.move(to_x, to_y, steps=5)
-        view.wait_for_timeout(500)
-        during = view.evaluate("Bokeh.documents[0].get_model_by_name('status').text")
+        said = "Bokeh.documents[0].get_model_by_name('status').text"
+        there = tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (1.5, -0.5)})
+        expected = f"<b>{tadcore.simulate(there).outcome}</b>"
+        view.wait_for_function(f"{said} === '{expected}'", timeout=20_000)
+        during = view.evaluate(said)
         view.mouse.up()
         view.wait_for_timeout(500)
         view.screenshot(path=tmp_path / "explorer.png")

@@ -148,8 +148,13 @@ def test_controls_mark_every_network_change(runs):
 def test_controls_of_chosen_players(runs):
     ax = plotting.controls(runs["paper-i2"], "y", players=["target", "attacker"], ax=agg_figure()[1], changes=False)
     assert len(ax.lines) == 2
+    assert len(plotting.controls(runs["paper-i2"], players="d2", ax=agg_figure()[1], changes=False).lines) == 1
     with pytest.raises(ValueError, match="no player 'd9'"):
         plotting.controls(runs["paper-i2"], players=["d9"], ax=agg_figure()[1])
+    with pytest.raises(ValueError, match="axis: got 'z', must be one of x, y"):
+        plotting.controls(runs["paper-i2"], "z", ax=agg_figure()[1])
+    with pytest.raises(ValueError, match="axis: got 'z', must be one of x, y"):
+        plotting.compare(runs["paper-i2"], runs["paper-i2"], what="controls", axis="z", ax=agg_figure()[1])
 
 
 def test_theta_of_a_game_seen_whole_is_zero_not_rounding(runs):
@@ -160,6 +165,21 @@ def test_theta_of_a_game_seen_whole_is_zero_not_rounding(runs):
     limited = plotting.theta(runs["paper-i1"], ax=agg_figure()[1])
     assert [t.get_text() for t in limited.texts] == [r"$\Theta=0$"]
     assert np.nanmin(limited.lines[0].get_ydata()) > 1e-6
+
+
+@pytest.mark.parametrize("case", ["paper-i1", "paper-i2"])
+@pytest.mark.parametrize("styled", [False, True])
+def test_the_legend_of_theta_leaves_the_axes_their_width(runs, case, styled):
+    with plotting.style() if styled else contextlib.nullcontext():
+        ax = plotting.theta(runs[case])
+        drawn(ax.figure)
+    width, legend = ax.bbox.width, ax.get_legend().get_window_extent()
+    assert ax.figure.bbox.x0 <= legend.x0
+    assert legend.x1 <= ax.figure.bbox.x1
+    ax.get_legend().remove()
+    drawn(ax.figure)
+    assert width > 0.9 * ax.bbox.width
+    ax.figure.clear()
 
 
 def test_a_restless_network_is_thinned_and_says_so(restless):

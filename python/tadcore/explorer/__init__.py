@@ -1,6 +1,7 @@
 """The explorer: a local page on which one drags players and radii and sees the game at once.
 
-Started by ``tadcore explore``. It needs Bokeh (the extra ``explore``); games in the plane only.
+Started by ``tadcore explore``. It needs Bokeh (the extra ``explore``). A game in space
+is shown in projection along one of its axes.
 """
 
 from ._model import Explorer

@@ -9,7 +9,7 @@ from bokeh.models import ColumnDataSource, PointDrawTool, Range1d, Span
 from bokeh.plotting import figure
 from bokeh.transform import factor_cmap, factor_mark
 
-from tadcore.plotting._style import look
+from tadcore.plotting._style import look, symbol
 
 if TYPE_CHECKING:
     from tadcore.scenario import Scenario
@@ -21,18 +21,24 @@ _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "D": "diamond", "v": 
 _ROOM = 0.35  # of the extent, kept free around the game: room to drag to
 
 
-def arena(sources: Sources) -> Any:
-    """The plane: paths, discs, starts to drag, players at the instant shown."""
+def frame(sources: Sources) -> tuple[float, float, float, float]:
+    """A square around the paths with room to drag to: left, right, bottom, top."""
     paths: Any = sources["paths"].data
     every = np.concatenate([np.concatenate([np.asarray(part) for part in paths[axis]])[None] for axis in "xy"])
     low, high = every.min(axis=1), every.max(axis=1)
     half = (0.5 + _ROOM) * max(float((high - low).max()), 0.5)
     x, y = (low + high) / 2
+    return float(x - half), float(x + half), float(y - half), float(y + half)
+
+
+def arena(sources: Sources) -> Any:
+    """The plane: paths, discs, starts to drag, players at the instant shown."""
+    left, right, bottom, top = frame(sources)
+    players = list(sources["paths"].data["player"])
     plot = figure(
         name="arena", frame_width=520, frame_height=520, tools="wheel_zoom,reset,save", active_scroll=None,
-        x_range=Range1d(x - half, x + half), y_range=Range1d(y - half, y + half), x_axis_label="x", y_axis_label="y",
+        x_range=Range1d(left, right), y_range=Range1d(bottom, top), x_axis_label="x", y_axis_label="y",
     )  # fmt: skip
-    players = list(paths["player"])
     colour = factor_cmap("player", [look(p).colour for p in players], players)
     marker = factor_mark("player", [_MARKERS[look(p).marker] for p in players], players)
     plot.circle("x", "y", radius="r", source=sources["discs"], fill_color=colour, line_color=colour, fill_alpha=0.06,
@@ -55,8 +61,6 @@ def arena(sources: Sources) -> Any:
 
 def timeline(sources: Sources, sc: Scenario, now: Span) -> Any:
     """Who sees whom, when: edge × time."""
-    from ._page import edge_name
-
     rows = [edge_name(p, q) for p in sc.constrained for q in sc.players if q != p]
     observers = list(sc.constrained)
     plot = _history("network", now, height=70 + 13 * len(rows), y_range=rows[::-1])
@@ -75,11 +79,10 @@ def theta(sources: Sources, now: Span) -> Any:
 
 
 def controls(sources: Sources, sc: Scenario, now: Span) -> Any:
-    """The speed of every player over time."""
-    plot = _history("speed |u|", now, height=190)
+    """The speed of every player over time, or one component of its control."""
+    plot = _history("control u", now, height=190)
     for player in sc.players:
         plot.line("t", player, source=sources["controls"], color=look(player).colour, line_width=2)
-    plot.y_range.start = 0
     plot.xaxis.axis_label = "time t"
     return plot
 
@@ -94,3 +97,13 @@ def _history(title: str, now: Span, **options: Any) -> Any:
     plot.x_range.update(start=0, range_padding=0)
     plot.add_layout(now)
     return plot
+
+
+def edge_name(observer: str, seen: str) -> str:
+    """Return the label of an edge in the timeline."""
+    return f"{plain(observer)} → {plain(seen)}"
+
+
+def plain(player: str) -> str:
+    """Return the symbol of a player without mathematics: d1, τ, a."""
+    return symbol(player).replace(r"\tau", "τ").translate(str.maketrans("", "", "_{}"))

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from bokeh.events import Pan, PanEnd, PanStart
 from bokeh.layouts import column, row
-from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Slider, Toggle
+from bokeh.models import Button, ColumnDataSource, CustomJS, Div, RadioButtonGroup, Slider, Toggle
 
 from tadcore.errors import TadcoreError
 from tadcore.plotting._raster import bars_of
-from tadcore.plotting._style import symbol
 
-from ._figures import arena, controls, instant, theta, timeline
+from ._figures import arena, controls, edge_name, frame, instant, plain, theta, timeline
+from ._pointer import Pointer
 
 if TYPE_CHECKING:
     from bokeh.document import Document
@@ -47,7 +47,10 @@ class Page:
         self.status = Div(name="status", styles={"font-size": "1.2em"}, min_height=28)
         step = explorer.scenario.step
         self.time = Slider(start=0.0, end=1.0, value=0.0, step=step, title="time t", format="0.000", width=560)
+        self.planes = RadioButtonGroup(labels=list(explorer.planes), active=0, visible=len(explorer.planes) > 1)
+        self.traces = RadioButtonGroup(labels=["speed", *"xyz"[: explorer.scenario.dim]], active=0)
         self._grabbed: tuple[str, str] | None = None
+        self.pointer = Pointer(self.drag, self.rest)
         self._quiet = False
         self.play()
         self.arena = arena(self.sources)
@@ -64,14 +67,16 @@ class Page:
     def add_to(self, document: Document) -> None:
         """Put the page into a document."""
         document.title = "tadcore explorer"
+        self.pointer.document = document
         document.add_root(self.layout())
 
     def layout(self) -> LayoutDOM:
         """Everything in its place."""
         save = row(self._button("Scenario as TOML", self.save_toml), self._button("Figure as PNG", self.save_png))
         hint = Div(text="Drag a player's start, or the rim of its visibility disc (the small diamond).")
-        left = column(self.status, self.arena, self.time, hint, save)
-        return row(left, column(*self.plots), column(*self._sliders))
+        left = column(self.status, self.planes, self.arena, self.time, hint, save)
+        *upper, effort = self.plots
+        return row(left, column(*upper, self.traces, effort), column(*self._sliders))
 
     def change(self, action: Callable[[], None]) -> bool:
         """Do something that plays the game again; show the new game, or why there is none."""
@@ -91,11 +96,11 @@ class Page:
         times = run.times[at].tolist()
         self.sources["paths"].data = {
             "player": list(players),
-            "x": [run.position[at, p, 0].tolist() for p in range(len(players))],
-            "y": [run.position[at, p, 1].tolist() for p in range(len(players))],
+            "x": [run.position[at, p, explorer.plane[0]].tolist() for p in range(len(players))],
+            "y": [run.position[at, p, explorer.plane[1]].tolist() for p in range(len(players))],
         }
         if self._grabbed is None or self._grabbed[0] != "starts":  # the browser moves what it drags
-            x, y = explorer.scenario.positions.T.tolist()
+            x, y = explorer.flat(explorer.scenario.positions).T.tolist()
             self.sources["starts"].data = {
                 "player": list(players), "x": x, "y": y, "name": [plain(p) for p in players]
             }  # fmt: skip
@@ -107,9 +112,9 @@ class Page:
             "right": [bar[1] for _, bar in bars],
         }
         self.sources["theta"].data = {"t": times, "theta": run.theta[at].tolist()}
-        effort = {p: np.linalg.norm(run.control[at, i], axis=1).tolist() for i, p in enumerate(players)}
-        self.sources["controls"].data = {"t": times, **effort}
-        self.status.text = f"<b>{_escaped(str(run.outcome))}</b>"
+        self._trace()
+        said = f" (a preview in steps of {run.scenario.step:g})" if explorer.preview else ""
+        self.status.text = f"<b>{_escaped(str(run.outcome))}</b>{said}"
         self._quiet = True
         self.time.end = run.outcome.time or explorer.scenario.step
         self.time.value = explorer.time
@@ -118,7 +123,7 @@ class Page:
     def show_instant(self) -> None:
         """Send what stands at the instant shown: players, discs, handles and edges."""
         explorer, sc = self.explorer, self.explorer.scenario
-        where, players = explorer.positions, sc.players
+        where, players = explorer.flat(explorer.positions), sc.players
         self.sources["now"].data = {"player": list(players), "x": where[:, 0].tolist(), "y": where[:, 1].tolist()}
         sight = [(p, float(r)) for p, r in zip(sc.constrained, sc.visibility_radii, strict=True) if math.isfinite(r)]
         centres = [where[players.index(p)].tolist() for p, _ in sight]
@@ -159,11 +164,18 @@ class Page:
         if self._grabbed is not None:
             kind, player = self._grabbed
             act = self.explorer.move if kind == "starts" else self.explorer.stretch
-            self.change(lambda: act(player, round(x, 4), round(y, 4)))
+            self.change(lambda: act(player, round(x, 4), round(y, 4), preview=True))
+
+    def rest(self) -> None:
+        """The pointer rests: play the game itself, of which only a preview is seen."""
+        if self.explorer.preview:
+            self.change(self.explorer.settle)
 
     def drop(self) -> None:
         """A drag ends: put everything where it belongs."""
+        self.pointer.follow()
         self._grabbed = None
+        self.explorer.settle()
         self.play()
         self.show_instant()
         self._set_sliders()
@@ -182,9 +194,28 @@ class Page:
 
     def _listen(self) -> None:
         self.arena.on_event(PanStart, lambda event: self.grab(event.x, event.y))
-        self.arena.on_event(Pan, lambda event: self.drag(event.x, event.y))
+        self.arena.on_event(Pan, lambda event: self.pointer.moved(event.x, event.y))
         self.arena.on_event(PanEnd, lambda event: self.drop())
         self.time.on_change("value", lambda attribute, old, new: self._scrub(new))
+        self.planes.on_change("active", lambda attribute, old, new: self._project(self.planes.labels[new]))
+        self.traces.on_change("active", lambda attribute, old, new: self._trace())
+
+    def _project(self, plane: str) -> None:
+        self.explorer.project(plane)
+        self.arena.xaxis.axis_label, self.arena.yaxis.axis_label = plane[0], plane[1]
+        self.play()
+        left, right, bottom, top = frame(self.sources)
+        self.arena.x_range.update(start=left, end=right)
+        self.arena.y_range.update(start=bottom, end=top)
+        self.show_instant()
+
+    def _trace(self) -> None:
+        """Send the speeds, or one component of the controls."""
+        explorer, run, which = self.explorer, self.explorer.run, self.traces.active - 1
+        control = run.control[explorer.sampled]
+        values = np.linalg.norm(control, axis=2) if which < 0 else control[..., which]
+        traces = {p: values[:, i].tolist() for i, p in enumerate(explorer.scenario.players)}
+        self.sources["controls"].data = {"t": run.times[explorer.sampled].tolist(), **traces}
 
     def _scrub(self, time: float) -> None:
         if not self._quiet:
@@ -253,16 +284,6 @@ class Page:
     def _span(self) -> tuple[float, float]:
         x, y = self.arena.x_range, self.arena.y_range
         return float(x.end - x.start), float(y.end - y.start)
-
-
-def edge_name(observer: str, seen: str) -> str:
-    """Return the label of an edge in the timeline."""
-    return f"{plain(observer)} → {plain(seen)}"
-
-
-def plain(player: str) -> str:
-    """Return the symbol of a player without mathematics: d1, τ, a."""
-    return symbol(player).replace(r"\tau", "τ").translate(str.maketrans("", "", "_{}"))
 
 
 def _discs(players: list[str], centres: list[list[float]], radii: list[float]) -> dict[str, list[Any]]:

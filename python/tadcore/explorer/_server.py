@@ -36,7 +36,7 @@ def serve(sc: Scenario, *, port: int = 0, browse: bool = True, ready: Callable[[
     Parameters
     ----------
     sc : Scenario
-        Where to begin; a game in the plane.
+        Where to begin.
     port : int
         The port on the loopback address; 0 takes a free one.
     browse : bool
@@ -46,8 +46,6 @@ def serve(sc: Scenario, *, port: int = 0, browse: bool = True, ready: Callable[[
 
     Raises
     ------
-    ScenarioError
-        The game is in space.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     OSError

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ._axes import new_axes
 from ._ends import label_ends
 from ._paths import LAID_UNDER, name_runs
-from ._series import span
-from ._style import COLUMN, look, new_axes, outcome_text
+from ._series import known_axis, span
+from ._style import COLUMN, look, outcome_text
 from ._trajectories import trajectories
 
 if TYPE_CHECKING:
@@ -62,20 +63,25 @@ def compare(
         return trajectories(run_a, ax, full=run_b, names=names)
     if what not in ("controls", "distances"):
         raise ValueError(f'what: got {what!r}, must be "trajectories", "controls" or "distances"')
+    if what == "controls":
+        known_axis(run_a, axis)
     ax = new_axes(ax, COLUMN, 2.5)
     shown = run_a.scenario.constrained if what == "controls" else run_a.scenario.players[:-1]
     last = max(run_a, run_b, key=lambda run: run.times[-1])  # names stand at the frame, where this one's curves end
     ends = []
     for run, dashed in ((run_b, True), (run_a, False)):
-        for player in shown:
+        for i, player in enumerate(shown):
             part = run.dataset["control" if what == "controls" else "distance"].sel(player=player)
             values = np.asarray((part.sel(axis=axis) if what == "controls" else part).values, dtype=float)
             it = look(player)
             width: dict[str, Any] = {"linestyle": LAID_UNDER, "linewidth": 0.9} if dashed else {}
-            ax.plot(
-                run.times, values, color=it.colour, marker=it.marker, markersize=3.4,
-                markevery=[len(values) - 1], clip_on=False, zorder=2.0 if dashed else 2.5, **width,
-            )  # fmt: skip
+            common: dict[str, Any] = {"color": it.colour, "zorder": 2.0 if dashed else 2.5}
+            (curve,) = ax.plot(run.times, values, **common, **width)
+            # dashes say which run it is, so markers along the way say whose curve, in grey too
+            step = max(len(values) // 5, 1)
+            curve.set(marker=it.marker, markersize=3.4, markerfacecolor="white", markeredgewidth=0.8)
+            curve.set_markevery((min(step // 2 + i * step // len(shown), len(values) - 1), step))
+            ax.plot(run.times[-1:], values[-1:], marker=it.marker, markersize=3.4, clip_on=False, **common)
             if run is last:
                 ends.append((float(values[-1]), it.symbol, it.colour))
     ax.set(xlabel="time $t$", xlim=span(last.times))

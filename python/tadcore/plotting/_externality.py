@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._style import PAGE, edge_text, look, new_axes
+from ._axes import above, new_axes
+from ._style import PAGE, edge_text, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,6 +18,7 @@ __all__ = ["externality"]
 
 MAX_NAMED = 12
 """With more changes than this the edges are not named below the axis."""
+_ROOM = 0.6  # inches that the edges of one change take; in narrower places they stand upright
 
 
 def externality(run: Run, *, ax: Axes | None = None) -> Axes:
@@ -74,11 +76,13 @@ def externality(run: Run, *, ax: Axes | None = None) -> Axes:
     ax.set_xlim(-0.6, max(count - 0.4, 0.6))
     if count <= MAX_NAMED:
         times = found["time"].values.tolist()
-        ax.set_xticks(place, [f"{t:.6g}\n{_named(run, t)}" for t in times])
+        upright = ax.get_window_extent().width / ax.figure.dpi < _ROOM * count
+        labels = [f"{t:.6g}\n{_named(run, t)}" for t in times]
+        ax.set_xticks(place, labels, rotation=90 if upright else 0)
         ax.set_xlabel("time $t$ of the change, and its edges")
     else:
         ax.set_xlabel("changes of the network, in order")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(players) + 2, frameon=False, handletextpad=0.1)
+    above(ax, ax.get_legend_handles_labels()[0], handletextpad=0.1)
     return ax
 
 

@@ -9,12 +9,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._axes import above, new_panels
 from ._series import MAX_VERTICALS, mark_changes, span
-from ._style import COLUMN, PAGE, look, symbol
+from ._style import look, symbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from tadcore.simulation import Run
 
@@ -46,7 +46,7 @@ def gains(
     """
     observers = run.scenario.constrained
     if axes is None:
-        axes = _new_axes(len(observers), columns)
+        axes = new_panels(len(observers), columns, page_from=2, row=1.15, rest=0.6, sharex=True)
     panels: list[Axes] = list(np.asarray(axes, dtype=object).ravel())
     entries = run.scenario.players[:-1]
     thin = len(run.network_changes) > MAX_VERTICALS
@@ -70,18 +70,6 @@ def gains(
     return axes
 
 
-def _new_axes(panels: int, columns: int) -> NDArray[Any]:
-    import matplotlib.pyplot as plt
-
-    columns = max(min(columns, panels), 1)
-    rows = -(-panels // columns)
-    width = PAGE if columns > 1 else COLUMN
-    _, axes = plt.subplots(
-        rows, columns, sharex=True, squeeze=False, figsize=(width, 0.6 + 1.15 * rows), layout="constrained"
-    )
-    return np.asarray(axes)
-
-
 def _legend(ax: Axes, entries: tuple[str, ...]) -> None:
     """Say above the first panel whose state each curve weighs."""
     handles = []
@@ -89,10 +77,4 @@ def _legend(ax: Axes, entries: tuple[str, ...]) -> None:
         it = look(player)
         label = f"$X_{{{symbol(player)}}}-X_a$"
         handles.append(Line2D([], [], color=it.colour, linestyle=it.dashes, linewidth=1.1, label=label))
-    figure: Figure | Any = ax.figure
-    width = ax.get_window_extent().width / figure.dpi
-    ax.legend(
-        handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize="small",
-        ncols=min(len(handles), max(int(width / 0.66), 1)),
-        columnspacing=0.9, handlelength=1.7, handletextpad=0.4, borderaxespad=0.1,
-    )  # fmt: skip
+    above(ax, handles, fontsize="small")

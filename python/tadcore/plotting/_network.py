@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
-from ._style import COLUMN, PAGE, look, note, players
+from ._axes import new_panels
+from ._style import look, note, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,7 +72,8 @@ def network(
     """
     changes = list(run.network_changes)
     if axes is None:
-        axes = _new_axes(max(min(len(changes), max_panels), 1), columns)
+        count = max(min(len(changes), max_panels), 1)
+        axes = new_panels(count, columns, page_from=4, row=0.22, rest=0.0, square=True)
     panels = list(np.asarray(axes, dtype=object).ravel())
     shown = min(len(changes), max_panels, len(panels))
     end = float(run.outcome.time)
@@ -98,22 +100,6 @@ def network(
 def _edge(edge: Any) -> Edge:
     observer, seen = edge
     return str(observer), str(seen)
-
-
-def _new_axes(panels: int, columns: int) -> NDArray[Any]:
-    import matplotlib.pyplot as plt
-
-    columns = max(min(columns, panels), 1)
-    rows = -(-panels // columns)
-    width = PAGE if columns > 3 else COLUMN
-    _, axes = plt.subplots(
-        rows,
-        columns,
-        squeeze=False,
-        figsize=(width, rows * (width / columns + 0.22)),
-        layout="constrained",
-    )
-    return np.asarray(axes)
 
 
 def _places(names: list[str]) -> dict[str, NDArray[np.float64]]:

@@ -10,14 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from ._style import look, symbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.legend import Legend
 
 _HATCHES = ("", "////", "....", "xxxx", "----", "oo")
 _LIGHT = (0.62, 0.45, 0.3)  # share of white in the fills of defenders, in turn
@@ -62,27 +63,11 @@ def boxes(names: Sequence[str]) -> list[Patch]:
     return [Patch(facecolor=it.fill, edgecolor="0.25", hatch=it.hatch, linewidth=0.5, label=it.label) for it in looks]
 
 
-def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **options: Any) -> Legend:
-    """A legend above the axes, where it covers nothing: in one row, or in as many as its share of the width needs."""
-    settings: dict[str, Any] = {
-        "loc": "lower center",
-        "bbox_to_anchor": (0.5, 1.0),
-        "frameon": False,
-        "columnspacing": 0.9,
-        "handlelength": 1.7,
-        "handletextpad": 0.4,
-        "borderaxespad": 0.2,
-    }
-    most, figure = columns or len(handles), ax.get_figure(root=True)
-    assert figure is not None
-    place = ax.get_subplotspec()
-    share = len(place.colspan) / place.get_gridspec().ncols if place is not None else 1.0
-    for rows in range(-(-len(handles) // most), len(handles) + 1):
-        legend = ax.legend(handles=list(handles), ncols=-(-len(handles) // rows), **{**settings, **options})
-        # one that is wider takes its width from the axes, and leaves them nothing
-        if legend.get_window_extent().width <= share * figure.bbox.width:
-            break
-    return legend
+def stack(ax: Axes, x: NDArray[np.float64], base: NDArray[np.float64], top: NDArray[np.float64], name: str) -> None:
+    """Fill one outcome's layer of a stack of steps, and draw its upper rim."""
+    it = outcome_look(name)
+    ax.fill_between(x, base, top, step="post", facecolor=it.fill, hatch=it.hatch, edgecolor="0.35", linewidth=0.0)
+    ax.step(x, top, where="post", color="0.25", linewidth=0.6)
 
 
 def quantity_label(name: str) -> str:

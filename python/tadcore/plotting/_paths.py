@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch
 from numpy.typing import NDArray
 
+from ._axes import above
 from ._style import look, players
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ Floats = NDArray[np.float64]
 
 LAID_UNDER: Any = (0, (4, 2))
 """Dashes of a run laid under another."""
-_ONE_LINE = 42  # letters of two names that fit side by side above one column
 _AT_START = 0.015  # of the diagonal; a mark nearer than this would hide the marker of the start
 _SIZES = {"*": 7.5, "X": 5.8}
 
@@ -76,17 +76,7 @@ def name_runs(ax: Axes, names: tuple[str, str]) -> None:
         Line2D([], [], color="0.2", linestyle="-", label=names[0]),
         Line2D([], [], color="0.2", linestyle=LAID_UNDER, label=names[1]),
     ]
-    ax.legend(
-        handles=handles,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=2 if sum(map(len, names)) <= _ONE_LINE else 1,
-        frameon=False,
-        borderaxespad=0.2,
-        fontsize="small",
-        columnspacing=1.0,
-        handlelength=1.8,
-    )
+    above(ax, handles, fontsize="small", columnspacing=1.0, handlelength=1.8)
 
 
 def _heading(ax: Axes, path: Floats, colour: str) -> None:

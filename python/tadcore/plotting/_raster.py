@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from ._style import COLUMN, edge_text, look, new_axes, note
+from ._axes import new_axes
+from ._style import COLUMN, edge_text, look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._axes import above, new_axes
 from ._ends import label_ends
-from ._style import COLUMN, look, new_axes, note, players
+from ._style import COLUMN, look, note, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +46,8 @@ def controls(
     axis : str
         The component: "x", "y" or "z".
     players : sequence of str, optional
-        Whose controls; by default those of the players whose sight is limited: the defenders, in I2 the target too.
+        Whose controls, one player or several; by default those of the players whose sight is limited: the defenders,
+        in I2 the target too.
     ax : Axes, optional
         Where to draw; new axes of a one-column figure if not given.
     changes : bool
@@ -55,9 +57,15 @@ def controls(
     -------
     Axes
         The axes drawn in.
+
+    Raises
+    ------
+    ValueError
+        The game has no such player or no such axis.
     """
-    shown = list(players) if players is not None else _constrained(run)
+    shown = [players] if isinstance(players, str) else list(players) if players is not None else _constrained(run)
     _known(run, shown)
+    known_axis(run, axis)
     ax = new_axes(ax, COLUMN, 2.3)
     control = run.dataset["control"].sel(axis=axis)
     curves = {p: np.asarray(control.sel(player=p).values, dtype=float) for p in shown}
@@ -167,10 +175,7 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
             label=name,
         )
         lines.append(line)
-    ax.legend(
-        handles=lines, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(lines), frameon=False,
-        columnspacing=1.0, handlelength=1.8, handletextpad=0.4, borderaxespad=0.2,
-    )  # fmt: skip
+    above(ax, lines)
     quiet = times[np.flatnonzero(total > 1e-12 * scale)[-1]]
     if times[-1] - quiet > 0.15 * times[-1]:
         middle = 0.5 * (quiet + times[-1])
@@ -188,6 +193,13 @@ def _known(run: Run, shown: Sequence[str]) -> None:
     for p in shown:
         if p not in players(run):
             raise ValueError(f"no player {p!r}; this game has {', '.join(players(run))}")
+
+
+def known_axis(run: Run, axis: str) -> None:
+    """Refuse a component that the game does not have."""
+    axes = [str(a) for a in run.dataset["axis"].values]
+    if axis not in axes:
+        raise ValueError(f"axis: got {axis!r}, must be one of {', '.join(axes)}")
 
 
 def span(times: Floats) -> tuple[float, float]:

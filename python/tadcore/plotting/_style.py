@@ -152,13 +152,3 @@ def points(renderer: RendererBase) -> float:
     """Return the pixels in one typographic point."""
     pixels: Any = renderer.points_to_pixels(1.0)
     return float(pixels)
-
-
-def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
-    """Return ``ax``, or the axes of a new figure of this size in inches."""
-    if ax is not None:
-        return ax
-    import matplotlib.pyplot as plt
-
-    fig = plt.figure(figsize=(width, height), layout="constrained")
-    return fig.add_subplot(projection=projection)

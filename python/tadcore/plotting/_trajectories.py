@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ._axes import new_axes
 from ._inset import crowd, magnify
 from ._labels import Labels
 from ._paths import disc, name_runs, paths, positions
-from ._style import COLUMN, edge_text, look, new_axes, note, outcome_text, players
+from ._style import COLUMN, edge_text, look, note, outcome_text, players
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,7 +104,7 @@ def trajectories(
         occupied = np.concatenate([points, spots])
         pad = float(run.scenario.capture_radii.max())
         inset = magnify(ax, crowded, occupied, low, high, pad, lambda where: draw(where, marked=False))
-    _labels(ax, shown, marks)
+    _labels(ax, shown, marks, inset)
     if inset is not None:
         _ends(inset, run)
     if full is not None:
@@ -154,9 +155,12 @@ def _marks(run: Run) -> list[_Mark]:
     return marks
 
 
-def _labels(ax: Axes, shown: list[Run], marks: list[_Mark]) -> None:
+def _labels(ax: Axes, shown: list[Run], marks: list[_Mark], inset: Axes | None) -> None:
     """Name the players at their starts and the edges at their marks, clear of everything drawn."""
     labels = Labels(ax)
+    if inset is not None:  # the frame around what it magnifies
+        (left, right), (bottom, top) = inset.get_xlim(), inset.get_ylim()
+        labels.avoid_curve([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)])
     for run in reversed(shown):
         position = positions(run)
         for p in range(position.shape[1]):

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
+from ._axes import above, new_axes
 from ._labels import Labels
-from ._outcomes import above, boxes, outcome_look
-from ._style import COLUMN, PAGE, look, new_axes, symbol
+from ._outcomes import boxes, outcome_look
+from ._style import COLUMN, PAGE, look, symbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +61,8 @@ def outcome_map(
     left, right, bottom, top = extent = (*_edges(x, y), *_edges(y, x))
     ratio = (top - bottom) / (right - left)
     width = PAGE if ratio < 1.0 / 3.0 else COLUMN
-    ax = new_axes(ax, width, float(np.clip((width - 0.6) * ratio + 0.8, 1.6, 5.5)))
+    beside = 0.6 if quantity == "time" and legend else 0.0  # inches that the colour bar takes
+    ax = new_axes(ax, width, float(np.clip((width - 0.6 - beside) * ratio + (0.5 if beside else 0.8), 1.6, 5.5)))
     if quantity == "outcome":
         names = _areas(ax, found, x, y, extent)
         if legend:
@@ -68,8 +70,8 @@ def outcome_map(
     else:
         image = ax.imshow(found.dataset["time"].values, origin="lower", extent=extent, cmap="cividis", zorder=1.0)
         if legend:
-            beside = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
-            beside.figure.colorbar(image, cax=beside, label="time of the end")
+            bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
+            bar.figure.colorbar(image, cax=bar, label="time of the end")
     _players(ax, found, extent, radii=radii, dark=quantity == "time")
     who = symbol(found.player)
     ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
@@ -127,7 +129,7 @@ def _players(ax: Axes, found: OutcomeMap, extent: tuple[float, ...], *, radii: b
             markerfacecolor="white" if varies else it.colour, markeredgecolor=it.colour if varies else edge,
         )  # fmt: skip
         labels.avoid_spot(at, 5.0)
-        labels.add(at, it.symbol, color=it.colour, leader_from=14.0)
+        labels.add(at, it.symbol, color="black", leader_from=14.0)
         if not radii or varies:
             continue
         if player in reach:

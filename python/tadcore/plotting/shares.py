@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from tadcore.statistics import outcome_names
 from tadcore.statistics._outcomes import indicators
 
-from ._outcomes import above, boxes, input_label, outcome_look, parts_of
-from ._style import COLUMN, PAGE, new_axes
+from ._axes import above, new_axes, new_panels
+from ._outcomes import boxes, input_label, parts_of, stack
+from ._style import COLUMN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,11 +70,9 @@ def outcomes_by_input(
     ax = new_axes(ax, COLUMN, 2.2)
     names, base = parts_of(list(ended)), np.zeros(len(edges))
     for outcome in names:
-        it = outcome_look(outcome)
         share = np.bincount(where[ended[outcome]], minlength=len(filled)) / filled
         top = base + np.append(share, share[-1])
-        ax.fill_between(edges, base, top, step="post", facecolor=it.fill, hatch=it.hatch, edgecolor="0.35", linewidth=0)
-        ax.step(edges, top, where="post", color="0.25", linewidth=0.5)
+        stack(ax, edges, base, top, outcome)
         base = top
     ax.set(xlabel=input_label(name), ylabel="share of trials", xlim=(edges[0], edges[-1]), ylim=(0.0, 1.0))
     if legend:
@@ -108,12 +107,7 @@ def outcomes_by_inputs(
         There are fewer axes than inputs, or an input cannot be drawn.
     """
     if axes is None:
-        import matplotlib.pyplot as plt
-
-        columns = max(min(3, len(names)), 1)
-        rows = max(-(-len(names) // columns), 1)
-        figure = plt.figure(figsize=(PAGE, 1.6 * rows + 0.4), layout="constrained")
-        axes = np.asarray(figure.subplots(rows, columns, sharey=True, squeeze=False), dtype=object)
+        axes = new_panels(len(names), 3, page_from=1, row=1.6, rest=0.4, sharey=True)
     if axes.size < len(names):
         raise ValueError(f"{len(names)} inputs need as many axes, got {axes.size}")
     for i, ax in enumerate(axes.flat):

@@ -10,9 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from ._axes import above, new_axes
 from ._ends import label_ends
-from ._outcomes import above, boxes, input_label, outcome_look, parts_of, quantity_label
-from ._style import COLUMN, new_axes, symbol
+from ._outcomes import boxes, input_label, outcome_look, parts_of, quantity_label, stack
+from ._style import COLUMN, symbol
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,14 +77,11 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
     """
     ax = new_axes(ax, COLUMN, 2.5)
     names = [name for name in parts_of(found.names) if name != "timeout"]
-    steps: dict[str, Any] = {"step": "post", "linewidth": 0.0}
     if stacked:
         base = np.zeros_like(found.times)
         for name in names:
-            it = outcome_look(name)
             top = base + found[name]
-            ax.fill_between(found.times, base, top, facecolor=it.fill, hatch=it.hatch, edgecolor="0.35", **steps)
-            ax.step(found.times, top, where="post", color="0.25", linewidth=0.6)
+            stack(ax, found.times, base, top, name)
             base = top
         handles: list[Any] = list(boxes(names))
         if bands:
@@ -100,7 +98,9 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
         for name in names:
             it, i = outcome_look(name), found.names.index(name)
             if bands:
-                ax.fill_between(found.times, found.low[i], found.high[i], color=it.colour, alpha=0.16, **steps)
+                ax.fill_between(
+                    found.times, found.low[i], found.high[i], color=it.colour, alpha=0.16, step="post", linewidth=0.0
+                )
             ax.step(found.times, found[name], where="post", color=it.colour, linestyle=it.dashes)
             ends.append((float(found[name][-1]), it.label, it.colour))
         label_ends(ax, ends)

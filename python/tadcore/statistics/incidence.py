@@ -175,6 +175,8 @@ def _instants(time: ArrayLike, trials: int, step: float, steps: int) -> np.ndarr
     with np.errstate(invalid="ignore"):
         good = np.abs(count - np.rint(count)) <= _OFF_GRID
         good &= (count > -0.5) & (count < steps + 0.5)
-    refuse_where("time", times, ~good, f"a multiple of the step ({step!r}) in [0, T]")
+    refuse_where(
+        "time", times, ~good, f"a multiple of the step ({step!r}) between 0 and the horizon ({steps * step:.6g})"
+    )
     whole: np.ndarray[tuple[int], np.dtype[np.int64]] = np.rint(count).astype(np.int64)
     return whole

@@ -8,6 +8,29 @@
 //! network-adapted gains of the players that see too little, single recorded runs and large ensembles of runs. It knows
 //! nothing of Python; the bindings live in a crate of their own.
 //!
+//! ## One run
+//!
+//! ```
+//! use tadcore::cancel::CancelToken;
+//! use tadcore::game::{Interaction, bank};
+//! use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
+//! use tadcore::simulation::{Outcome, Setup, simulate};
+//!
+//! let game = bank::paper_game(Interaction::I1, 1.0)?; // or Game::new with weights and a grid of your own
+//! let start = bank::paper_i1_limited();
+//! let positions = start.positions.concat();
+//! let setup = Setup { dim: 2, positions: &positions, visibility: &start.visibility, capture: &start.capture };
+//!
+//! let cancel = CancelToken::new();
+//! let policy = Policy::new(game, DEFAULT_TABLE_BYTES, &cancel)?; // solves the equilibrium; shared by all runs
+//! let run = simulate(&policy, &setup, &cancel)?;
+//! assert_eq!(run.outcome, Outcome::Intercepted(0)); // d1, at t = 279 · 0.005 = 1.395 as printed in the paper
+//! assert_eq!(run.steps, 279);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! `cargo run --release --example run` tells this run as it happens, `--example ensemble` plays many games at once.
+//!
 //! ## Layers
 //!
 //! Each layer uses only layers above it in this table (asserted by a test).

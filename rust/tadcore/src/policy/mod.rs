@@ -1,5 +1,7 @@
 //! The policy: at grid instant t_k and under a topology, what every player does until t_{k+1}.
 //!
+//! $$z(t_{k+1}) = e^{C\delta}\, z(t_k), \qquad X_a(t_{k+1}) = X_a(t_k) + h_a \int_0^\delta e^{Cs}\,\mathrm{d}s\; z(t_k)$$
+//!
 //! | symbol | here | meaning |
 //! |---|---|---|
 //! | C | [`closed_loop::matrix`] | ż = C z with all feedback frozen at t_k |

@@ -1,7 +1,14 @@
 //! The Riccati equations of the game, solved backward from the horizon: P on the grid, and with it the feedback Nash
 //! equilibrium.
 //!
-//! In interaction I1 three coupled equations, P_d, P_τ, P_a (eq:Riccati); in I2 one symmetric equation, P (eq:RDE).
+//! In interaction I1 three coupled equations (eq:Riccati), with $A = S_d P_d + S_\tau P_\tau + S_a P_a$:
+//!
+//! $$\dot P_p = P_p A + A^\top P_p - P_p S_p P_p - Q_p, \quad P_p(T) = F_p, \quad p = d, \tau, a;$$
+//!
+//! in I2 one symmetric equation (eq:RDE), with $S = S_a - S_d - S_\tau$:
+//!
+//! $$\dot P = P S P - Q, \quad P(T) = F.$$
+//!
 //! All matrices are reduced Kronecker factors of size N × N. A solution may escape to infinity inside the horizon:
 //! that is a property of the game, reported as [`EquilibriumError::FiniteEscape`] with the escape time, and no numbers
 //! are returned for such a game.

@@ -1,5 +1,10 @@
 //! Synthesis: the gains of the constrained players at one instant, min Θ₁ (I1) or min Θ₂ (I2) over what each may use.
 //!
+//! $$\Theta_1 = \gamma_1\|\Delta Q_d\|^2 + \gamma_2\|\Delta Q_\tau\|^2 + \gamma_3\|\Delta Q_a\|^2 + \gamma_4\|S_1\|^2, \qquad
+//! \Theta_2 = \gamma_1\|\Delta Q\|^2 + \gamma_2\|S_2\|^2 + \gamma_3\|S_3\|^2,$$
+//!
+//! where ΔQ and S say by how much the gains fail the equilibrium's Riccati equations and its feedback.
+//!
 //! | symbol | here | meaning |
 //! |---|---|---|
 //! | G | [`Gains::rows`] | stacked rows g_i, u_i = g_i z: the reduced factors of K_i 𝓘_i |

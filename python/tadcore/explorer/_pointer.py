@@ -1,0 +1,49 @@
+"""The pointer during a drag: many movements, few pictures."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bokeh.document import Document
+
+_GATHER = 8  # milliseconds in which movements are gathered into one
+_REST = 80  # milliseconds without a movement after which the pointer rests
+
+
+class Pointer:
+    """Calls ``drag`` with where the pointer is, not with all the places where it has been, and ``rest`` when it rests.
+
+    A picture takes longer than a movement. Without this, movements would queue behind pictures, and the game would
+    follow the pointer late.
+    """
+
+    def __init__(self, drag: Callable[[float, float], None], rest: Callable[[], None]) -> None:
+        self._drag, self._rest = drag, rest
+        self._at: tuple[float, float] | None = None
+        self._waiting: Any = None
+        self.document: Document | None = None
+
+    def moved(self, x: float, y: float) -> None:
+        """Note where the pointer is."""
+        if self._at is None:
+            self._after(_GATHER, self.follow)
+        self._at = x, y
+
+    def follow(self) -> None:
+        """Go where the pointer is, if it has moved."""
+        if self._at is not None:
+            (x, y), self._at = self._at, None
+            self._drag(x, y)
+            self._after(_REST, self._rest)
+
+    def _after(self, milliseconds: int, action: Callable[[], None]) -> None:
+        """Do something later, instead of what was to be done later until now."""
+        if self.document is None:
+            return
+        if self._waiting is not None:
+            with contextlib.suppress(ValueError):  # it is done already
+                self.document.remove_timeout_callback(self._waiting)
+        self._waiting = self.document.add_timeout_callback(action, milliseconds)
