@@ -1,8 +1,8 @@
 """The lockstep Monte Carlo for three defenders in the plane, written out for the compiler: the strongest form in Numba.
 
 States are eight contiguous rows, one for each coordinate of z, so that the loop over trials that looks at distances has
-no branch and no call in it and is vectorised. Trials that end are replaced by the last one, so the rest stay contiguous. A
-block of trials is as large as the second-level cache; the table is one flat array, 16 numbers an entry, indexed by
+no branch and no call in it and is vectorised. Trials that end are replaced by the last one: the rest stay contiguous.
+A block of trials is as large as the second-level cache; the table is one flat array, 16 numbers an entry, indexed by
 (step, topology). Nothing is allocated inside the loops. Missing entries are solved by `_lockstep._solve`.
 """
 
@@ -73,7 +73,7 @@ def _advance(z, entries, table, count):
 
 @njit(cache=True, error_model="numpy")
 def lockstep3(starts, sight, capture, P, r, r_tau, r_a, step, gamma, index, table, filled):
-    """Play all trials, block by block, each in lockstep. Outcomes, final instants, and how much of the table is filled."""
+    """Play all trials in blocks, each in lockstep. Outcomes, final instants, and how much of the table is filled."""
     trials, steps = starts.shape[0], index.shape[0]
     ends, instants = np.full(trials, -1), np.full(trials, steps)
     z = np.empty((8, BLOCK))
