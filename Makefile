@@ -74,7 +74,7 @@ format:  ## rewrite sources in the project's format
 bench:  ## Criterion benchmarks of the core
 	cargo bench
 
-peers: $(STAMP)  ## the same work in SciPy and Numba beside ours, in one process run each
+peers: $(STAMP)  ## the same work in SciPy, Numba and JAX beside ours, in one process run each
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 

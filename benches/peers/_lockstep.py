@@ -1,4 +1,4 @@
-"""The Monte Carlo in compiled Python, with a (step, topology) table: trial after trial, and all trials in lockstep.
+"""The Monte Carlo in compiled Python, trial after trial, with a (step, topology) table; lockstep is `_lockstep3`.
 
 Both fill the table with `_numba.newton` where an entry is missing, and keep it. States are arrays of trials; a topology
 of three defenders is a number of twelve bits and indexes its step's row of the table.
@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 
-@njit
+@njit(cache=True)
 def _transition(gains, P, r_tau, r_a, step):
     """exp(Cδ) of the frozen loop, by a Taylor series (‖C‖δ is some hundredths)."""
     N = P.shape[1]
@@ -25,7 +25,7 @@ def _transition(gains, P, r_tau, r_a, step):
     return E
 
 
-@njit
+@njit(cache=True)
 def _solve(key, P, r, r_tau, r_a, step, gamma):
     """The transition at one (instant, topology)."""
     n, N = r.size, r.size + 1
@@ -40,7 +40,7 @@ def _solve(key, P, r, r_tau, r_a, step, gamma):
     return _transition(_numba.newton(fne, column, M, W, seen, gamma), P, r_tau, r_a, step)
 
 
-@njit
+@njit(cache=True)
 def _observe(z, sight, capture):
     """Code of the outcome (-1 none, -2 captured, else the defender) and the topology of one trial."""
     N = z.shape[0]
@@ -65,7 +65,7 @@ def _observe(z, sight, capture):
     return caught, key
 
 
-@njit
+@njit(cache=True)
 def _advance(z, E, before):
     """z ← E z; `before` is scratch of the same shape."""
     N = z.shape[0]
@@ -79,41 +79,9 @@ def _advance(z, E, before):
         z[a, 0], z[a, 1] = x, y
 
 
-@njit
-def lockstep(z, sight, capture, P, r, r_tau, r_a, step, gamma, index, table, filled):
-    """Play all trials together; `z` is used up. Outcomes, final instants, and how much of the table is filled."""
-    trials, steps, scratch = z.shape[0], index.shape[0], np.empty(z.shape[1:])
-    ends, instants = np.full(trials, -1), np.full(trials, steps)
-    live, keys = np.arange(trials), np.empty(trials, np.int64)
-    count = trials
-    for k in range(steps):
-        a = 0
-        while a < count:
-            caught, key = _observe(z[live[a]], sight, capture)
-            if caught != -1:
-                ends[live[a]], instants[live[a]] = caught, k
-                count -= 1
-                live[a] = live[count]
-            else:
-                keys[a] = key
-                a += 1
-        for a in range(count):
-            if index[k, keys[a]] < 0:
-                table[filled] = _solve(keys[a], P[k], r, r_tau, r_a, step, gamma)
-                index[k, keys[a]] = filled
-                filled += 1
-        for a in range(count):
-            _advance(z[live[a]], table[index[k, keys[a]]], scratch)
-        if count == 0:
-            break
-    for a in range(count):
-        ends[live[a]], _ = _observe(z[live[a]], sight, capture)
-    return ends, instants, filled
-
-
-@njit
+@njit(cache=True)
 def one_by_one(z, sight, capture, P, r, r_tau, r_a, step, gamma, index, table, filled):
-    """Play trial after trial; otherwise as `lockstep`."""
+    """Play trial after trial; otherwise as `_lockstep3.lockstep3`."""
     trials, steps, scratch = z.shape[0], index.shape[0], np.empty(z.shape[1:])
     ends, instants = np.full(trials, -1), np.full(trials, steps)
     for t in range(trials):

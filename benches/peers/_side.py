@@ -77,7 +77,7 @@ def start(description: str) -> bool:
     parser = argparse.ArgumentParser(description=summary)
     parser.add_argument("--quick", action="store_true", help="a smoke run: smallest sizes, few repetitions, no Numba")
     quick: bool = parser.parse_args().quick
-    packages = [p for p in ("numpy", "scipy", "numba", "tadcore") if importlib.util.find_spec(p)]
+    packages = [p for p in ("numpy", "scipy", "numba", "jax", "tadcore") if importlib.util.find_spec(p)]
     versions = ", ".join(f"{p} {importlib.metadata.version(p)}" for p in packages)
     print(f"{summary}\nPython {platform.python_version()}, {versions}; one thread")
     if hasattr(os, "getloadavg"):

@@ -1,15 +1,18 @@
-"""A Monte Carlo of the paper's I1 with limited observations: Numba with a table, and tadcore, on one thread.
+"""A Monte Carlo of the paper's I1 with limited observations: SciPy, Numba, JAX and tadcore, on one thread.
 
 n = 3, T = 6, δ = 0.005, ζ = (5, 2.25, 1.25), σ = 0.1; every coordinate of every player is uniform in [−3, 3]. Numba
 has the (step, topology) table too, filled by Newton from the canonical start where an entry is missing (one descent:
 it does not look for lower minima, tadcore does). `cold` starts with an empty table, Riccati not counted; `warm` plays
-the same trials from the table that a first round filled. The paper's own way, SciPy at every instant, is `run.py`: it
-takes about ten seconds a trial.
+the same trials from the table that a first round filled. JAX is warm only, from the table that Numba filled, in batches
+of 4,000. SciPy is the paper's own way, BFGS at every instant (`run.py`): a few trials, whose mean time stands for all.
 
 How to read the table: medians over interleaved repetitions, trials per second of CPU time, `ratio` the speed of tadcore
 over that of the row. Every outcome, defender and time must be equal, but for one trial in a thousand, where a distance
 meets a radius within rounding.
 """
+
+import importlib.util
+import time
 
 import _side
 import numpy as np
@@ -42,22 +45,22 @@ def compare(what: str, trials: int, repetitions: int, numba: bool) -> list[tuple
     memos = {}
     if numba:
         import _lockstep
+        import _lockstep3
 
-        memos = {name: _lockstep.Memo(GAME, 400_000) for name in ("one_by_one", "lockstep")}
+        memos = {loop: _lockstep.Memo(GAME, 400_000) for loop in (_lockstep.one_by_one, _lockstep3.lockstep3)}
 
-    def peer(name: str):
-        memo = memos[name]
+    def peer(loop):
+        memo = memos[loop]
         if what == "cold":
             memo.index.fill(-1)
             memo.filled = 0
-        return memo.play(getattr(_lockstep, name), positions, VISIBILITY, CAPTURE)
+        return memo.play(loop, positions, VISIBILITY, CAPTURE)
 
     prepared = [solved() for _ in range(repetitions + 1)] if what == "cold" else []
     own = (lambda: tadcore_play(prepared.pop(), positions)) if what == "cold" else lambda: tadcore_play(core, positions)
     contenders = {"tadcore": own}
-    for name, label in (("one_by_one", "Numba, trial after trial"), ("lockstep", "Numba, lockstep")):
-        if name in memos:
-            contenders[label] = lambda name=name: peer(name)
+    for label, loop in zip(("Numba, trial after trial", "Numba, lockstep"), memos, strict=False):
+        contenders[label] = lambda loop=loop: peer(loop)
     times, answers = _side.interleave(contenders, repetitions)
     best = times["tadcore"].cpu
     for name, answer in answers.items():
@@ -65,10 +68,47 @@ def compare(what: str, trials: int, repetitions: int, numba: bool) -> list[tuple
             apart = np.any([a != b for a, b in zip(answer[:2], answers["tadcore"][:2], strict=True)], axis=0)
             apart |= np.abs(answer[2] - answers["tadcore"][2]) > 1e-9
             _side.agree(f"{what}, {name}, share of trials that differ", float(np.mean(apart)), 1e-3)
-    return [
+    rows = [
         (f"{what}, {trials:,} trials: {name}", f"{trials / t.cpu:,.0f}", f"{t.cpu / best:,.2f}")
         for name, t in times.items()
     ]
+    if memos and what == "warm":
+        rows += jax_row(memos[_lockstep3.lockstep3], positions, answers["tadcore"], best / trials)
+    return rows
+
+
+def jax_row(memo, positions, ours, best: float) -> list[tuple[str, ...]]:
+    """One batch in JAX, the faster of two plays after one that compiles; `best` is tadcore's CPU time for a trial."""
+    if not importlib.util.find_spec("jax"):
+        print("JAX row left out: JAX is not installed (pip install '.[bench]')")
+        return []
+    import _jax
+
+    taken, each = positions[: _jax.BATCH], []
+    for _ in range(3):
+        began = time.process_time()
+        answer = _jax.play(memo, taken, VISIBILITY, CAPTURE)
+        each.append((time.process_time() - began) / len(taken))
+    apart = np.any([a != b[: len(taken)] for a, b in zip(answer[:2], ours[:2], strict=True)], axis=0)
+    apart |= np.abs(answer[2] - ours[2][: len(taken)]) > 1e-9
+    _side.agree("warm, JAX, share of trials that differ", float(np.mean(apart)), 1e-3)
+    least = min(each[1:])
+    return [(f"warm, {len(taken):,} trials: JAX, scan and vmap", f"{1 / least:,.0f}", f"{least / best:,.2f}")]
+
+
+def papers_way(trials: int, best: float) -> tuple[str, ...]:
+    """SciPy on the first trials, against the CPU seconds that a trial takes tadcore cold."""
+    import run
+
+    core, positions = solved(), starts(trials)
+    began = time.process_time()
+    theirs = [run.scipy_run(start)[0] for start in positions]
+    each = (time.process_time() - began) / trials
+    kind, defender, when = tadcore_play(core, positions)
+    named = [("timeout", "captured", f"d{d + 1} intercepts")[k] for k, d in zip(kind, defender, strict=True)]
+    apart = [a != (b[0], b[1]) for a, b in zip(zip(named, when, strict=True), theirs, strict=True)]
+    _side.agree(f"SciPy, share of {trials} trials that differ", float(np.mean(apart)), 0.0)
+    return f"cold, SciPy the paper's way, {trials} trials", f"{1 / each:,.3f}", f"{each / best:,.0f}"
 
 
 def main() -> None:
@@ -76,14 +116,14 @@ def main() -> None:
     numba = _side.numba_wanted(quick)
     rows = compare("cold", 50 if quick else 1_000, 1 if quick else 3, numba)
     rows += compare("warm", 50 if quick else 20_000, 1 if quick else 9, numba)
+    if not quick:
+        rows.append(papers_way(3, 1.0 / float(rows[0][1].replace(",", ""))))
     _side.table(("contender", "trials/s", "ratio"), rows)
     threaded(50 if quick else 200_000)
 
 
 def threaded(trials: int) -> None:
     """One and two threads, warm, by the wall clock; the bits must be equal."""
-    import time
-
     core, positions = solved(), starts(trials)
     best, answers = {}, {}
     for threads in (1, 1, 2, 1, 2):

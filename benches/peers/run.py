@@ -42,11 +42,11 @@ def ended(positions: np.ndarray) -> str | None:
     return "captured" if far[-1] <= CAPTURE[-1] else None
 
 
-def scipy_run():
+def scipy_run(start: np.ndarray = POSITIONS):
     """Outcome, time, instants of change and positions at every instant."""
     n, N = GAME.n, GAME.n + 1
     P = _paper.riccati(GAME, 2)
-    times, changes, path = GAME.times, [], [POSITIONS]
+    times, changes, path = GAME.times, [], [start]
     seen = gains = None
     for k in range(GAME.steps + 1):
         positions = path[-1]
