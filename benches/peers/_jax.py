@@ -1,7 +1,8 @@
 """The lockstep Monte Carlo in JAX: `lax.scan` over instants, `vmap` over a batch, from a table that is full already.
 
-JAX compiles one program of fixed shape: nobody leaves a batch early, and a missing entry cannot be solved on the way. So
-it gets the table that Numba filled with the same trials, and only its warm speed is compared. Double precision, one CPU.
+JAX compiles one program of fixed shape: nobody leaves a batch early, and a missing entry cannot be solved on the way.
+So it gets the table that Numba filled with the same trials, and only its warm speed is compared. Double precision, one
+CPU.
 """
 
 import os
