@@ -13,11 +13,12 @@ import pytest
 pytest.importorskip("tadcore._core")
 ROOM = 2.0
 CHILD = """
-import sys, time
+import signal, sys, time
 import numpy as np
 import tadcore
 from tadcore.sampling import Box
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who starts us in the background may ignore it
 n, what, how = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 defender = {"control_weight": 1.0, "capture_radius": 0.02, "visibility_radius": 1.5}
 sc = tadcore.Scenario.model_validate({
@@ -58,7 +59,10 @@ def test_it_stops_soon(n, what, how):
         assert child.poll() is None
         sent = time.monotonic()
         child.send_signal(signal.SIGINT)
-        said, at = child.stdout.readline().split()
+        try:
+            said, at = child.communicate(timeout=60.0)[0].split()
+        finally:
+            child.kill()
     assert said == "interrupted"
     print(f"n = {n}, {what}, {how}: stopped after {float(at) - sent:.3f} s")
     assert float(at) - sent < ROOM
