@@ -14,8 +14,10 @@ SCRIPT = Path(__file__).parent / "typing_user.py"
 def checked(tool, *arguments):
     """Run a type checker on files outside the project's own settings."""
     command = [sys.executable, "-m", tool, *map(str, arguments)]
-    source = str(Path(__import__("tadcore").__file__).parents[1])
-    environment = {**os.environ, "MYPYPATH": source, "PYTHONPATH": source}
+    source = Path(__import__("tadcore").__file__).parents[1]
+    # An installed package is found by itself; mypy refuses to have its folder named.
+    installed = source.name in ("site-packages", "dist-packages")
+    environment = os.environ if installed else {**os.environ, "MYPYPATH": str(source), "PYTHONPATH": str(source)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     return done.returncode, done.stdout + done.stderr
 
