@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 from listed import EQUIVALENT, MUTANTS
@@ -23,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = Path("rust/tadcore/src")
 # The unit tests first; properties draw their games from a fixed seed.
 TESTS = ["tadcore", "riccati", "synthesis", "paper", "ensemble", "properties"]
-ENVIRONMENT = {"PROPTEST_CASES": "24", "PROPTEST_RNG_SEED": "20250117", "PROPTEST_FAILURE_PERSISTENCE": "off"}
+ENVIRONMENT = {"PROPTEST_CASES": "24", "PROPTEST_RNG_SEED": "20250117"}
 # Seconds after which a test program hangs, as a multiple of its time without a mutant and at least.
 PATIENCE, LEAST = 10.0, 20.0
 SWITCH = """
@@ -70,7 +71,7 @@ def plant(tree, mutants):
             if own == file:
                 edits.append((*place(text, marked, f"{file}, {formula}"), number, instead))
         edits.sort(reverse=True)
-        for (first, *_), (_, last, *_) in zip(edits, edits[1:], strict=False):
+        for (first, *_), (_, last, *_) in pairwise(edits):
             if last > first:
                 sys.exit(f"{file}: two mutants overlap")
         for first, last, number, instead in edits:
@@ -97,12 +98,15 @@ def copy(tree):
 def build(tree, target):
     """The test programs by name."""
     command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", "tadcore", "--lib", "--tests", "--no-run"]
-    environment = {**os.environ, "CARGO_TARGET_DIR": str(target), "RUSTFLAGS": "-Awarnings"}
     out = subprocess.run(
-        [*command, "--message-format=json-render-diagnostics"], cwd=tree, env=environment, stdout=subprocess.PIPE
+        [*command, "--message-format=json-render-diagnostics"],
+        cwd=tree,
+        env={**os.environ, "CARGO_TARGET_DIR": str(target)},
+        capture_output=True,
+        text=True,
     )
     if out.returncode:
-        sys.exit("the mutants do not compile")
+        sys.exit(f"{out.stderr}\nthe mutants do not compile")
     messages = [json.loads(line) for line in out.stdout.splitlines()]
     made = [m for m in messages if m.get("executable") and m["reason"] == "compiler-artifact"]
     return {m["target"]["name"]: Path(m["executable"]) for m in made}

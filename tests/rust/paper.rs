@@ -167,3 +167,21 @@ fn a_bad_row_is_refused_before_anything_runs_and_a_raised_token_stops() {
     assert_eq!(done.map(|ends| ends.len()), Ok(3));
     assert_eq!(cancelled, Err(RunError::Cancelled(Cancelled)));
 }
+
+/// A game that is over before it begins has one row, with the network of its start.
+#[test]
+fn a_game_over_at_once_is_recorded_with_its_network() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let mut start = bank::paper_i1_limited();
+        start.positions[3] = vec![-2.0, 1.95];
+        if interaction == Interaction::I2 {
+            start.visibility.push(10.0);
+        }
+        let record = run(&paper(interaction, 1.0), &start);
+        assert_eq!((record.outcome, record.steps, record.networks.len()), (Outcome::Captured, 0, 1));
+        // d₁ sees as far as 5: everyone; d₃ as far as 1.25: d₁ at a distance of 1.
+        let network = &record.networks[0];
+        assert!((0..4).all(|j| network.sees(0, j) && network.sees(2, j) == (j == 0)));
+        assert_eq!((record.unconverged, record.positions), (0, start.positions.concat()));
+    }
+}
