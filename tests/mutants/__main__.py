@@ -11,7 +11,6 @@ import argparse
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -61,38 +60,39 @@ def place(text, marked, where):
     return start, start + len(part)
 
 
-def plant(tree, mutants):
-    """Writes every mutant into the copied sources."""
-    for file in MUTANTS:
-        path = tree / CORE / file
-        text = path.read_text()
-        edits = []
-        for number, own, formula, marked, instead in mutants:
-            if own == file:
-                edits.append((*place(text, marked, f"{file}, {formula}"), number, instead))
-        edits.sort(reverse=True)
-        for (first, *_), (_, last, *_) in pairwise(edits):
-            if last > first:
-                sys.exit(f"{file}: two mutants overlap")
-        for first, last, number, instead in edits:
-            part = text[first:last]
-            if part.endswith(";"):
-                choice = f"if crate::mutant({number}) {{ {instead} }} else {{ {part} }}"
-            else:
-                choice = f"(if crate::mutant({number}) {{ {instead} }} else {{ {part} }})"
-            text = text[:first] + choice + text[last:]
-        path.write_text(text)
-    with (tree / CORE / "lib.rs").open("a") as lib:
-        lib.write(SWITCH)
+def planted(file, text, mutants):
+    """A source text with its mutants, each a choice at run time."""
+    edits = []
+    for number, own, formula, marked, instead in mutants:
+        if own == file:
+            edits.append((*place(text, marked, f"{file}, {formula}"), number, instead))
+    edits.sort(reverse=True)
+    for (first, *_), (_, last, *_) in pairwise(edits):
+        if last > first:
+            sys.exit(f"{file}: two mutants overlap")
+    for first, last, number, instead in edits:
+        part = text[first:last]
+        choice = f"if crate::mutant({number}) {{ {instead} }} else {{ {part} }}"
+        text = text[:first] + (choice if part.endswith(";") else f"({choice})") + text[last:]
+    return text
 
 
-def copy(tree):
-    """The workspace without what was built from it; files that did not change keep their time."""
-    shutil.rmtree(tree, ignore_errors=True)
-    for name in ["rust", "tests/rust", "benches"]:
-        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("target", "__pycache__"))
-    for name in ["Cargo.toml", "Cargo.lock", "README.md"]:
-        shutil.copy2(ROOT / name, tree / name)
+def copy(tree, mutants):
+    """Makes `tree` the workspace with the mutants; a file that is as it was keeps its time, so that Cargo builds less."""
+    paths = [path for folder in ["rust", "tests/rust", "benches"] for path in (ROOT / folder).rglob("*")]
+    wanted = {path.relative_to(ROOT) for path in paths if path.suffix in {".rs", ".toml", ".html"}}
+    wanted |= {Path("Cargo.toml"), Path("Cargo.lock"), Path("README.md")}
+    for old in [path for path in tree.rglob("*") if path.is_file() and path.relative_to(tree) not in wanted]:
+        old.unlink()
+    for path in wanted:
+        text = (ROOT / path).read_text()
+        if path.is_relative_to(CORE):
+            text = planted(path.relative_to(CORE).as_posix(), text, mutants)
+            text += SWITCH if path == CORE / "lib.rs" else ""
+        copied = tree / path
+        if not copied.exists() or copied.read_text() != text:
+            copied.parent.mkdir(parents=True, exist_ok=True)
+            copied.write_text(text)
 
 
 def build(tree, target):
@@ -141,8 +141,7 @@ def main():
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     tree = target / "mutants-tree"
     mutants = numbered()
-    copy(tree)
-    plant(tree, mutants)
+    copy(tree, mutants)
     programs = build(tree, target)
     tests = [name for name in TESTS if name in programs]
     limits = {}
