@@ -185,3 +185,27 @@ fn a_game_over_at_once_is_recorded_with_its_network() {
         assert_eq!((record.unconverged, record.positions), (0, start.positions.concat()));
     }
 }
+
+/// Every player moves by its recorded velocity times δ, but for what the velocity changes within a step: positions and
+/// controls are recorded by different ways.
+#[test]
+fn players_move_by_their_velocities() {
+    for (interaction, start) in
+        [(Interaction::I1, bank::paper_i1_limited()), (Interaction::I2, bank::paper_i2_limited())]
+    {
+        let policy = paper(interaction, 1.0);
+        let (record, step) = (run(&policy, &start), policy.game().grid().step());
+        let row = 5 * 2;
+        for k in 0..record.steps {
+            for p in 0..5 {
+                let at = |k: usize, x: usize| k * row + p * 2 + x;
+                let difference = |x: usize| {
+                    record.positions[at(k + 1, x)] - record.positions[at(k, x)] - step * record.controls[at(k, x)]
+                };
+                let speed = record.controls[at(k, 0)].hypot(record.controls[at(k, 1)]);
+                let off = difference(0).hypot(difference(1));
+                assert!(off < 0.05 * step * (speed + 0.2), "player {p} at {k}: {off} of {}", step * speed);
+            }
+        }
+    }
+}
