@@ -11,7 +11,7 @@ RUSTDOC := -D warnings --html-in-header $(CURDIR)/rust/tadcore/katex.html
 RUST    := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python heavy faults fuzz audit lint format bench peers images docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python heavy faults fuzz mutants audit lint format bench peers images docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -53,6 +53,9 @@ fuzz: $(STAMP)  ## hostile bytes for the core, the saved table and the readers o
 	    -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=2048 || exit 1; done
 	$(BIN)/python -m pip install --quiet atheris
 	$(BIN)/python fuzz/scenario.py fuzz/corpus/scenario -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=6000
+
+mutants:  ## a sign flipped or an operator swapped in each formula of the core: which Rust test notices
+	$(PYTHON) tests/mutants
 
 audit: $(STAMP)  ## licences and sources of all that is used; known vulnerabilities where a database can be reached
 	$(BIN)/python tests/audit.py

@@ -167,3 +167,45 @@ fn a_bad_row_is_refused_before_anything_runs_and_a_raised_token_stops() {
     assert_eq!(done.map(|ends| ends.len()), Ok(3));
     assert_eq!(cancelled, Err(RunError::Cancelled(Cancelled)));
 }
+
+/// A game that is over before it begins has one row, with the network of its start.
+#[test]
+fn a_game_over_at_once_is_recorded_with_its_network() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let mut start = bank::paper_i1_limited();
+        start.positions[3] = vec![-2.0, 1.95];
+        if interaction == Interaction::I2 {
+            start.visibility.push(10.0);
+        }
+        let record = run(&paper(interaction, 1.0), &start);
+        assert_eq!((record.outcome, record.steps, record.networks.len()), (Outcome::Captured, 0, 1));
+        // d₁ sees as far as 5: everyone; d₃ as far as 1.25: d₁ at a distance of 1.
+        let network = &record.networks[0];
+        assert!((0..4).all(|j| network.sees(0, j) && network.sees(2, j) == (j == 0)));
+        assert_eq!((record.unconverged, record.positions), (0, start.positions.concat()));
+    }
+}
+
+/// Every player moves by its recorded velocity times δ, but for what the velocity changes within a step: positions and
+/// controls are recorded by different ways.
+#[test]
+fn players_move_by_their_velocities() {
+    for (interaction, start) in
+        [(Interaction::I1, bank::paper_i1_limited()), (Interaction::I2, bank::paper_i2_limited())]
+    {
+        let policy = paper(interaction, 1.0);
+        let (record, step) = (run(&policy, &start), policy.game().grid().step());
+        let row = 5 * 2;
+        for k in 0..record.steps {
+            for p in 0..5 {
+                let at = |k: usize, x: usize| k * row + p * 2 + x;
+                let difference = |x: usize| {
+                    record.positions[at(k + 1, x)] - record.positions[at(k, x)] - step * record.controls[at(k, x)]
+                };
+                let speed = record.controls[at(k, 0)].hypot(record.controls[at(k, 1)]);
+                let off = difference(0).hypot(difference(1));
+                assert!(off < 0.05 * step * (speed + 0.2), "player {p} at {k}: {off} of {}", step * speed);
+            }
+        }
+    }
+}

@@ -346,3 +346,46 @@ pub(super) fn sweep_of(shape: &Shape, width: Width) -> Sweep {
         2 1 1; 2 2 1; 3 2 1; 3 3 1; 4 3 1; 4 4 1; 5 4 2; 5 5 2; 6 5 2; 6 6 2; 7 6 2; 7 7 2; 8 7 2; 8 8 2;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::{self, Topology, squared_reach};
+    use crate::simulation::Reach;
+
+    /// Points whose distances are whole numbers, on the rims of whole radii: as one run sees and ends them.
+    #[test]
+    fn rims_belong_to_the_balls_at_every_size() {
+        let points = [
+            [9.0, 12.0],
+            [18.0, 24.0],
+            [0.0, 15.0],
+            [15.0, 36.0],
+            [-9.0, 12.0],
+            [0.0, 30.0],
+            [24.0, 45.0],
+            [-15.0, 0.0],
+        ];
+        let radii = [15.0, 30.0, 39.0, 15.0_f64.next_down(), 9.0, 6.0, 18.0, 12.0];
+        let shape = Shape { size: 3, rows: 2, dim: 2, words: 1 };
+        for turn in 0..radii.len() {
+            let row = |lane: usize, i: usize| points[(lane + 3 * i) % points.len()];
+            let radius = |lane: usize, i: usize| squared_reach(radii[(lane + i + turn) % radii.len()]);
+            let z: Vec<Lane> = (0..6).map(|e| std::array::from_fn(|l| row(l, e / 2)[e % 2])).collect();
+            let sight: Vec<Lane> = (0..2).map(|i| std::array::from_fn(|l| radius(l, i))).collect();
+            let capture: Vec<Lane> = (0..3).map(|i| std::array::from_fn(|l| radius(l, i + 2))).collect();
+            let mut keys = vec![[0; LANES]];
+            let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
+            let (compiled, ends) = observe::<Plain, 3, 2, 2>(&z, &sight, &capture);
+            assert_eq!((keys[0], caught), (compiled, u32::from(ends)));
+            for l in 0..LANES {
+                let state: Vec<f64> = z.iter().map(|lane| lane[l]).collect();
+                let mut topology = Topology::empty(2, 3);
+                network::observe(&state, 2, &[sight[0][l], sight[1][l]], &mut topology);
+                assert_eq!(topology.key(), Some(keys[0][l]));
+                let reach = Reach::new(&[2, 3, 4].map(|i| radii[(l + i + turn) % radii.len()]));
+                assert_eq!(reach.ends(&state, 2).is_some(), caught >> l & 1 == 1);
+            }
+        }
+    }
+}

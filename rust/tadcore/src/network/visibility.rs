@@ -53,7 +53,8 @@ pub fn observe(z: &[f64], dim: usize, reach: &[f64], topology: &mut Topology) {
 
 #[cfg(test)]
 mod tests {
-    use super::squared_reach;
+    use super::{observe, squared_reach};
+    use crate::network::Topology;
 
     #[test]
     fn squared_reach_is_the_rounded_comparison() {
@@ -62,5 +63,24 @@ mod tests {
             assert!(reach.sqrt() <= radius && reach.next_up().sqrt() > radius || reach == f64::MAX, "{radius}");
         }
         assert_eq!(squared_reach(f64::INFINITY), f64::INFINITY);
+    }
+
+    /// Of two radii whose squares are the largest that root to them: a distance on the rim is seen, one double further
+    /// it is not.
+    #[test]
+    fn a_ball_is_closed() {
+        let z = [9.0, 12.0, 18.0, 24.0, -9.0, 36.0];
+        let look = |radii: [f64; 2]| {
+            let mut topology = Topology::complete(2, 3);
+            observe(&z, 2, &radii.map(squared_reach), &mut topology);
+            topology
+        };
+        assert_eq!([15.0, 30.0].map(squared_reach), [225.0, 900.0]);
+        // z₁ to the attacker and to z₂ 15, to z₃ 30; z₂ to the attacker 30, to z₁ 15, to z₃ 3√97.
+        let on = look([15.0, 30.0]);
+        assert_eq!(on, Topology::from_fn(2, 3, |i, j| i == 1 || j < 2));
+        let under = look([15.0_f64.next_down(), 30.0_f64.next_down()]);
+        assert_eq!(under, Topology::from_fn(2, 3, |i, j| i == 1 && j != 1));
+        assert!(look([30.0, 30.0]).is_complete());
     }
 }

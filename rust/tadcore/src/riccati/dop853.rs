@@ -278,4 +278,31 @@ mod tests {
         assert!((8.5..10.0).contains(&end), "order of the step: {end}");
         assert!((8.0..9.5).contains(&dense), "order of the dense output: {dense}");
     }
+
+    /// e5 is of order 5 and e3 of order 3, so that the estimate h e5² / (e5² + e3² / 100)^½ is of order 8.
+    #[test]
+    fn the_error_estimate_has_order_eight() {
+        let estimate = |h: f64| {
+            let start = 0.1_f64;
+            let mut w = Workspace::new(&[start.tan(); 8], 8, 2);
+            Tangent.derivative(&[start.tan(); 8], &mut w.k[..8]);
+            w.attempt(&mut Tangent, h)
+        };
+        for h in [0.1, 0.05] {
+            let order = (estimate(h) / estimate(0.5 * h)).log2();
+            assert!((7.3..8.7).contains(&order), "{order}");
+        }
+    }
+
+    /// Entry (i, j) is divided by m_i m_j, m_i² being the largest entry of row i, but at least a thousandth of all.
+    #[test]
+    fn every_row_is_weighed_by_its_own_size() {
+        let mut w = Workspace::new(&[0.0; 8], 8, 2);
+        w.y_new.copy_from_slice(&[16.0, -2.0, -2.0, 4.0, 0.0, 0.0, 0.0, 0.0]);
+        w.weigh(0, (2, 2));
+        assert_eq!(w.point[..4], [1.0 / 16.0, 1.0 / 8.0, 1.0 / 8.0, 1.0 / 4.0]);
+        w.y_new[..4].copy_from_slice(&[4000.0, 0.0, 0.0, 1e-9]);
+        w.weigh(0, (2, 2));
+        assert!((w.point[3] - 0.25).abs() < 1e-15 && (w.point[0] * 4000.0 - 1.0).abs() < 1e-15);
+    }
 }

@@ -51,3 +51,37 @@ pub(super) fn check(s: f64, rate: f64, horizon: f64, resolved: f64) -> Result<()
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// P = R / (s* − s) has the growth 1 / (s* − s) whatever R is, and its escape time is s*.
+    #[test]
+    fn a_pole_is_named_from_before_it() {
+        let (pole, r) = (2.0_f64, [3.0, -1.0, -1.0, 1e-3]);
+        for left in [0.05, 1e-3, 1e-7] {
+            let s = pole - left;
+            let (p, dp) = (r.map(|r| r / left), r.map(|r| r / left / left));
+            let rate = growth(&p, &dp);
+            assert!((rate * left - 1.0).abs() < 1e-14);
+            let Err(EquilibriumError::FiniteEscape { escape_time, horizon }) = check(s, rate, 3.0, 0.5) else {
+                panic!("no escape seen at a distance of {left}");
+            };
+            assert!((escape_time - pole).abs() < 1e-14 && horizon == 3.0);
+            // One that lies behind the horizon is none.
+            assert_eq!(check(s, rate, pole - 0.5 * left, 0.5), Ok(()));
+        }
+        assert_eq!(growth(&[0.0; 4], &[1.0; 4]), 0.0);
+    }
+
+    /// Too far from the pole nothing is said; at the horizon itself a 10⁻¹²th is near enough.
+    #[test]
+    fn only_the_horizon_itself_is_judged_more_roughly() {
+        let rate = 2e12;
+        assert_eq!(check(1.0, rate, 3.0, 1e-15), Ok(()));
+        assert_eq!(check(1.0, 0.1 * rate, 1.0, 1e-15), Ok(()));
+        assert!(matches!(check(1.0, rate, 1.0, 1e-15), Err(EquilibriumError::FiniteEscape { .. })));
+        assert_eq!(check(1.0, -rate, 1.0, 1e-15), Ok(()));
+    }
+}

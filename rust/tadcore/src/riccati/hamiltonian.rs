@@ -340,3 +340,28 @@ fn write(flow: &Flow, p: &[f64], out: &mut [f64]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::game::{Interaction, bank};
+
+    /// ‖SP‖₁ is the largest column sum of the product written out, for a P of both signs.
+    #[test]
+    fn the_norm_of_the_product_is_that_of_the_dense_one() -> Result<(), crate::error::GameError> {
+        let game = bank::varied_game(Interaction::I2, 3, 1.0, 0.1)?;
+        let (flow, w, n) = (Flow::new(&game), game.weights(), 4);
+        let r = [w.r_d[0], w.r_d[1], w.r_d[2], w.r_tau];
+        for seed in 0..20 {
+            let p: Vec<f64> =
+                (0..n * n).map(|e| (1.7 * (e / n + e % n + 5 * (e / n) * (e % n) + seed) as f64).sin()).collect();
+            let s = |i: usize, j: usize| {
+                (1.0 / w.r_a - if i == j { 1.0 / r[i] } else { 0.0 }) / flow.balance[i] / flow.balance[j]
+            };
+            let entry = |i: usize, j: usize| (0..n).map(|k| s(i, k) * p[k * n + j]).sum::<f64>().abs();
+            let largest = (0..n).map(|j| (0..n).map(|i| entry(i, j)).sum::<f64>()).fold(0.0, f64::max);
+            assert!((flow.norm_sp(&p) - largest).abs() < 1e-13 * largest, "{seed}");
+        }
+        Ok(())
+    }
+}

@@ -99,4 +99,15 @@ mod tests {
         // A radius met exactly counts; of two equally near the first wins.
         assert_eq!(reach.ends(&[0.3, 0.4, 0.0, 0.5, 1.0, 0.0, 9.1, 0.0], 2), Some(Outcome::Intercepted(0)));
     }
+
+    /// 15 is a radius whose square is the largest number that roots to it: the rim itself decides.
+    #[test]
+    fn rims_belong_to_the_balls() {
+        assert_eq!(squared_reach(15.0), 225.0);
+        let (on, off) = (Reach::new(&[15.0, 15.0]), Reach::new(&[15.0_f64.next_down(), 15.0_f64.next_down()]));
+        let (caught, captured) = ([9.0, 12.0, 20.0, 0.0], [20.0, 0.0, 12.0, -9.0]);
+        assert_eq!(on.ends(&caught, 2), Some(Outcome::Intercepted(0)));
+        assert_eq!(on.ends(&captured, 2), Some(Outcome::Captured));
+        assert_eq!((off.ends(&caught, 2), off.ends(&captured, 2)), (None, None));
+    }
 }

@@ -1,0 +1,195 @@
+//! The gains from outside: against Θ as the terms define it, its differences, and projections written out in full.
+
+use nalgebra::{DMatrix, DVector};
+use tadcore::cancel::CancelToken;
+use tadcore::game::{Game, Interaction, bank};
+use tadcore::network::Topology;
+use tadcore::riccati::{self, Equilibrium};
+use tadcore::synthesis::{Gains, Method, Options, Problem, Status, Synthesizer};
+
+/// Numbers between −1 and 1 that are always the same.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self, len: usize) -> Vec<f64> {
+        (0..len).map(|_| self.next()).collect()
+    }
+}
+
+/// One instant of a game.
+struct Instant {
+    game: Game,
+    equilibrium: Equilibrium,
+    problem: Problem,
+}
+
+impl Instant {
+    fn new(interaction: Interaction, n: usize) -> Self {
+        let game = bank::varied_game(interaction, n, 0.2, 0.1).expect("a valid game");
+        let equilibrium = riccati::solve(&game, &CancelToken::new()).expect("an equilibrium");
+        let problem = Problem::new(&game, equilibrium.node(0));
+        Self { game, equilibrium, problem }
+    }
+
+    /// Θ by its terms, each a sum over the printed matrices.
+    fn theta(&self, g: &[f64]) -> f64 {
+        self.problem.weigh(&self.problem.terms(self.equilibrium.node(0), g))
+    }
+
+    /// GᵀRG.
+    fn square(&self, g: &[f64]) -> DMatrix<f64> {
+        let g = DMatrix::from_row_slice(self.problem.rows(), self.problem.size(), g);
+        let r = DMatrix::from_diagonal(&DVector::from_vec(self.game.constrained_control_weights()));
+        g.transpose() * r * g
+    }
+
+    /// What a row may be: a basis of its gains, by rows of m × N.
+    fn basis(&self, topology: &Topology) -> Vec<Vec<f64>> {
+        let (m, n) = (self.problem.rows(), self.problem.size());
+        let mut basis = Vec::new();
+        for i in 0..m {
+            for j in (0..n).filter(|&j| topology.sees(i, j)) {
+                let mut direction = vec![0.0; m * n];
+                if j != i {
+                    direction[i * n + i] = -1.0;
+                }
+                direction[i * n + j] = 1.0;
+                basis.push(direction);
+            }
+        }
+        basis
+    }
+
+    fn solve(&self, topology: &Topology, options: Options) -> Gains {
+        Synthesizer::new().solve(&self.problem, topology, options)
+    }
+}
+
+fn moved(g: &[f64], direction: &[f64], by: f64) -> Vec<f64> {
+    g.iter().zip(direction).map(|(g, d)| g + by * d).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn networks(instant: &Instant, count: usize, seed: u64) -> Vec<Topology> {
+    let (m, n) = (instant.problem.rows(), instant.problem.size());
+    let mut numbers = Numbers(seed);
+    let mut draw = || {
+        let bits: Vec<bool> = (0..m * n).map(|_| numbers.next() > 0.0).collect();
+        Topology::from_fn(m, n, |i, j| bits[i * n + j])
+    };
+    (0..count).map(|_| draw()).collect()
+}
+
+fn instants() -> impl Iterator<Item = Instant> {
+    [(Interaction::I1, 3), (Interaction::I2, 2), (Interaction::I1, 2), (Interaction::I2, 3)]
+        .into_iter()
+        .map(|(interaction, n)| Instant::new(interaction, n))
+}
+
+/// No iteration at all leaves the canonical start: in the space of what is seen, and F less it at right angles to that.
+#[test]
+fn the_canonical_start_is_the_orthogonal_projection() {
+    for instant in instants() {
+        for topology in networks(&instant, 20, 1) {
+            let options = Options { method: Method::Descent, max_iterations: 0 };
+            let start = instant.solve(&topology, options).rows;
+            let basis = instant.basis(&topology);
+            let left = moved(instant.problem.fne(), &start, -1.0);
+            assert!(basis.iter().all(|b| dot(b, &left).abs() < 1e-13), "{topology:?}");
+            // Within: the projection of the start itself, by least squares, is the start.
+            if basis.is_empty() {
+                assert!(start.iter().all(|&g| g == 0.0));
+                continue;
+            }
+            let columns = DMatrix::from_fn(start.len(), basis.len(), |e, v| basis[v][e]);
+            let goal = DVector::from_vec(start);
+            let normal = (columns.transpose() * &columns).cholesky().expect("independent directions");
+            let again = &columns * normal.solve(&(columns.transpose() * &goal));
+            assert!((again - goal).amax() < 1e-13, "{topology:?}");
+        }
+    }
+}
+
+/// Both methods end where no difference of Θ along any direction says that it falls, and at most at the start's Θ.
+#[test]
+fn both_methods_end_where_theta_is_stationary() {
+    for instant in instants() {
+        for topology in networks(&instant, 12, 2) {
+            let start = instant.solve(&topology, Options { method: Method::Descent, max_iterations: 0 });
+            for method in [Method::Newton, Method::Descent] {
+                let found = instant.solve(&topology, Options::new(method));
+                assert_eq!(found.status, Status::Converged);
+                let theta = instant.theta(&found.rows);
+                assert!((found.theta - theta).abs() <= 1e-12 * (1.0 + theta));
+                assert!(theta <= start.theta * (1.0 + 1e-12));
+                for b in instant.basis(&topology) {
+                    let h = 1e-5;
+                    let slope = instant.theta(&moved(&found.rows, &b, h)) - instant.theta(&moved(&found.rows, &b, -h));
+                    assert!((slope / (2.0 * h)).abs() < 1e-7, "{method:?} {slope}");
+                }
+            }
+        }
+    }
+}
+
+/// Θ with ‖X‖² replaced by its tangent at a critical point is a quadratic function below Θ. A point is certified exactly
+/// where that function, by its own second differences, is nowhere concave.
+#[test]
+fn a_certificate_is_a_lower_bound_that_is_convex() {
+    let mut certified = [0, 0];
+    for instant in instants() {
+        for topology in networks(&instant, 40, 3) {
+            let found = instant.solve(&topology, Options::default());
+            let (basis, gamma) = (instant.basis(&topology), instant.game.weights().gamma[0]);
+            if basis.is_empty() {
+                continue;
+            }
+            let goal = instant.square(instant.problem.fne());
+            let x = instant.square(&found.rows) - &goal;
+            let bound = |g: &[f64]| {
+                let terms = instant.problem.terms(instant.equilibrium.node(0), g);
+                let tangent = 2.0 * x.dot(&(instant.square(g) - &goal)) - x.norm_squared();
+                instant.problem.weigh(&terms) - gamma * terms[0] + gamma * tangent
+            };
+            let at =
+                |a: f64, i: usize, b: f64, j: usize| bound(&moved(&moved(&found.rows, &basis[i], a), &basis[j], b));
+            let form = DMatrix::from_fn(basis.len(), basis.len(), |i, j| {
+                0.25 * (at(1.0, i, 1.0, j) - at(1.0, i, -1.0, j) - at(-1.0, i, 1.0, j) + at(-1.0, i, -1.0, j))
+            });
+            let values = form.symmetric_eigenvalues();
+            let least = values.min() / values.amax();
+            if least.abs() > 1e-9 {
+                assert_eq!(found.certified, least > 0.0, "{topology:?} {least}");
+                certified[usize::from(found.certified)] += 1;
+            }
+        }
+    }
+    assert!(certified[0] >= 5 && certified[1] >= 50, "too few of one kind: {certified:?}");
+}
+
+/// K_i on differences and on z_i moves player i as its row on z does.
+#[test]
+fn the_papers_gains_give_the_same_velocities() {
+    let mut numbers = Numbers(4);
+    for instant in instants() {
+        let n = instant.problem.size();
+        for topology in networks(&instant, 10, 5) {
+            let found = instant.solve(&topology, Options::default());
+            let (k, z) = (found.paper_gains(&topology), numbers.vector(n));
+            for i in 0..instant.problem.rows() {
+                let (row, k) = (&found.rows[i * n..(i + 1) * n], &k[i * n..(i + 1) * n]);
+                let paper: f64 = (0..n).map(|j| k[j] * if j == i { z[i] } else { z[j] - z[i] }).sum();
+                assert!((dot(row, &z) - paper).abs() < 1e-13);
+                assert!((0..n).all(|j| topology.sees(i, j) || k[j] == 0.0));
+            }
+        }
+    }
+}
