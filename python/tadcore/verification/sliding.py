@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tadcore._arrays import as_index
 from tadcore.simulation import simulate
 
 from ._matrices import Floats
 from .events import play_by_events
+from .steps import refined
 
 if TYPE_CHECKING:
     from tadcore.network import Edge
@@ -104,7 +104,7 @@ def sliding_study(sc: Scenario, *, halvings: int = 3) -> SlidingStudy:
         The game has no equilibrium on [0, T].
     """
     play = play_by_events(sc)
-    runs = [simulate(sc.replace(step=sc.step / 2**i)) for i in range(as_index("halvings", halvings, 20) + 1)]
+    runs = [simulate(finer) for finer in refined(sc, halvings)]
     cells = np.full((5, len(play.slides), len(runs)), np.nan)
     for s, slide in enumerate(play.slides):
         for c, run in enumerate(runs):

@@ -90,6 +90,12 @@ class Refinement:
     undecided: np.ndarray
 
 
+def refined(sc: Scenario, halvings: int, *, least: int = 0) -> list[Scenario]:
+    """The scenario at δ, δ/2, δ/4, …: ``halvings`` + 1 of them."""
+    count = as_index("halvings", halvings, 20, least=least)
+    return [sc.replace(step=sc.step / 2**i) for i in range(count + 1)]
+
+
 def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:
     """Play a scenario at δ, δ/2, δ/4, ….
 
@@ -105,7 +111,7 @@ def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:
     StepStudy
         Outcome, network changes and chattering with each step.
     """
-    runs = [simulate(sc.replace(step=sc.step / 2**i)) for i in range(as_index("halvings", halvings, 20) + 1)]
+    runs = [simulate(finer) for finer in refined(sc, halvings)]
     return StepStudy(
         steps=tuple(run.scenario.step for run in runs),
         outcomes=tuple(run.outcome for run in runs),
@@ -133,8 +139,8 @@ def refine_batch(sc: Scenario, positions: ArrayLike, *, halvings: int = 2, threa
     Refinement
         Shares and times, and which games change.
     """
-    steps = [sc.step / 2**i for i in range(as_index("halvings", halvings, 20, least=1) + 1)]
-    batches = [simulate_batch(sc.replace(step=step), positions, threads=threads) for step in steps]
+    scenarios = refined(sc, halvings, least=1)
+    batches = [simulate_batch(finer, positions, threads=threads) for finer in scenarios]
     changed, moved = [], []
     undecided = np.zeros(len(batches[0]), dtype=bool)
     for one, other in itertools.pairwise(batches):
@@ -142,7 +148,8 @@ def refine_batch(sc: Scenario, positions: ArrayLike, *, halvings: int = 2, threa
         changed.append(float(differs.mean()))
         moved.append(float(np.abs(one.time - other.time)[~differs].max(initial=0.0)))
         undecided |= differs
-    return Refinement(tuple(steps), tuple(changed), tuple(moved), np.flatnonzero(undecided))
+    steps = tuple(finer.step for finer in scenarios)
+    return Refinement(steps, tuple(changed), tuple(moved), np.flatnonzero(undecided))
 
 
 def check_steps(run: Run) -> VerificationReport:
