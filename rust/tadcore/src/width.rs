@@ -11,7 +11,7 @@ pub(crate) enum Width {
     /// 256 bits; only made by [`Width::detect`] after asking the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// 512 bits, and all of the above; only made by [`Width::detect`].
+    /// 512 bits (AVX-512F and VL), and all of the above; only made by [`Width::detect`].
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
@@ -28,11 +28,22 @@ impl Width {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             all.push(Self::Avx2);
-            if std::arch::is_x86_feature_detected!("avx512f") {
+            if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
                 all.push(Self::Avx512);
             }
         }
         all
+    }
+}
+
+/// Asks for the cache line of `data[i]`, if there is one, before it is needed.
+#[inline(always)]
+pub(crate) fn prefetch<T>(data: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(x) = data.get(i) {
+        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+        // SAFETY: SSE is part of x86-64; a prefetch reads nothing that the program sees, and the address is a reference's.
+        unsafe { _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(x).cast()) }
     }
 }
 

@@ -4,10 +4,9 @@
 //! place, so the strips stay full. A strip whose topologies are not all on the shelf waits; when the others have moved,
 //! what is missing is solved and the waiting strips follow.
 
-use std::sync::RwLockReadGuard;
-
 use super::Batch;
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, sweep_of};
+use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep};
+use super::sweep::sweep_of;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::validation::BEYOND;
@@ -89,7 +88,9 @@ impl<'a> Chunk<'a> {
             cancel.check()?;
             w.missing.clear();
             w.waiting.clear();
-            self.pass(k, transitions.shelf(k), ends, w);
+            let next = (k + 1 < last).then(|| transitions.shelf(k + 1));
+            self.pass(k, &transitions.shelf(k), next.as_deref(), ends, w);
+            drop(next);
             lookups += self.strips.live as u64;
             if !w.waiting.is_empty() {
                 w.missing.sort_unstable();
@@ -107,10 +108,10 @@ impl<'a> Chunk<'a> {
     }
 
     /// Moves every strip that can move, and lists those that wait with the topologies they miss.
-    fn pass(&mut self, k: usize, shelf: RwLockReadGuard<'_, Shelf>, ends: &mut [End], w: &mut Worker) {
+    fn pass(&mut self, k: usize, shelf: &Shelf, next: Option<&Shelf>, ends: &mut [End], w: &mut Worker) {
         let mut from = 0;
         loop {
-            match (self.sweep)(&self.shape, &mut self.strips, from, &shelf, &mut w.keys) {
+            match (self.sweep)(&self.shape, &mut self.strips, from, shelf, next, &mut w.keys) {
                 Stop::End => return,
                 Stop::Caught(strip, lanes) => {
                     self.retire(strip, lanes, k, ends);
@@ -153,7 +154,7 @@ impl<'a> Chunk<'a> {
     fn alone(&mut self, strip: usize, shelf: &Shelf, keys: &mut Keys) -> bool {
         let live = self.strips.live;
         self.strips.live = live.min((strip + 1) * LANES);
-        let stop = (self.sweep)(&self.shape, &mut self.strips, strip, shelf, keys);
+        let stop = (self.sweep)(&self.shape, &mut self.strips, strip, shelf, None, keys);
         self.strips.live = live;
         stop == Stop::End
     }
@@ -203,18 +204,6 @@ impl<'a> Chunk<'a> {
             ends[trial] = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
         }
         Ok(())
-    }
-}
-
-impl Strips {
-    /// Copies a trial from one place to another.
-    fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
-        let steps = [shape.size * shape.dim, self.sight_step, self.capture_step];
-        for (lanes, step) in [&mut self.z, &mut self.sight, &mut self.capture].into_iter().zip(steps) {
-            for e in 0..step {
-                lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
-            }
-        }
     }
 }
 

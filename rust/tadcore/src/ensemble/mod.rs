@@ -11,8 +11,10 @@
 //! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
+mod anysize;
 mod chunk;
 mod strip;
+mod sweep;
 mod vector;
 
 use std::thread::available_parallelism;

@@ -11,8 +11,13 @@
 
 use std::collections::HashMap;
 
+use crate::width::prefetch;
+
 /// Bits of a topology up to which it is its own index.
 pub(crate) const DIRECT_BITS: usize = 12;
+
+/// Bytes of a cache line.
+const LINE: usize = 64;
 
 /// Rows of a stored column for matrices of `n` rows: whole vectors of four.
 #[must_use]
@@ -91,6 +96,8 @@ pub(crate) struct Shelf {
     keys: Vec<u64>,
     bits: usize,
     stride: usize,
+    /// Numbers before the first matrix.
+    skip: usize,
 }
 
 impl Shelf {
@@ -102,7 +109,7 @@ impl Shelf {
             13..=64 => Index::Hashed(OpenTable::default()),
             _ => Index::Wide(HashMap::new()),
         };
-        Self { index, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size) }
+        Self { index, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size), skip: 0 }
     }
 
     /// The slot of a topology's entry, 0 where there is none.
@@ -124,10 +131,21 @@ impl Shelf {
         }
     }
 
-    /// All matrices, one every `stride` numbers.
+    /// All matrices, one every `stride` numbers, the first at the start of a cache line.
     #[inline(always)]
     pub(crate) fn matrices(&self) -> &[f64] {
-        &self.matrices
+        &self.matrices[self.skip..]
+    }
+
+    /// Fetches the i-th part of what lookups read, into the second cache; as many parts as entries make the whole shelf.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, i: usize) {
+        for e in (0..self.stride).step_by(LINE / size_of::<f64>()) {
+            prefetch(&self.matrices, self.skip + i * self.stride + e);
+        }
+        if let Index::Direct(slots) = &self.index {
+            prefetch(slots, i * (LINE / size_of::<u16>()));
+        }
     }
 
     /// Entries held.
@@ -142,7 +160,7 @@ impl Shelf {
 
     /// The matrix in a slot.
     pub(crate) fn matrix(&self, slot: usize) -> &[f64] {
-        &self.matrices[slot * self.stride..(slot + 1) * self.stride]
+        &self.matrices()[slot * self.stride..][..self.stride]
     }
 
     /// Bytes that one more entry takes, the shelf's own memory with the first.
@@ -166,10 +184,10 @@ impl Shelf {
     /// Adds an entry that is not there yet.
     pub(crate) fn insert(&mut self, words: &[u64], matrix: &[f64]) {
         debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
-        if self.matrices.is_empty() {
-            self.matrices.resize(self.stride, 0.0);
+        if self.matrices.capacity() < self.matrices.len() + self.stride {
+            self.grow();
         }
-        let slot = self.matrices.len() / self.stride;
+        let slot = self.matrices().len() / self.stride;
         self.matrices.extend_from_slice(matrix);
         self.keys.extend_from_slice(words);
         match &mut self.index {
@@ -186,9 +204,21 @@ impl Shelf {
         }
     }
 
+    /// Doubles the room for matrices; slot 0 is there from the beginning.
+    fn grow(&mut self) {
+        let held = self.matrices().len().max(self.stride);
+        let most = LINE / size_of::<f64>() - 1;
+        let mut larger = Vec::<f64>::with_capacity(2 * held + most);
+        let skip = larger.as_ptr().align_offset(LINE).min(most);
+        larger.resize(skip, 0.0);
+        larger.extend_from_slice(self.matrices());
+        larger.resize(skip + held, 0.0);
+        (self.matrices, self.skip) = (larger, skip);
+    }
+
     /// Forgets every entry and keeps the memory.
     pub(crate) fn clear(&mut self) {
-        self.matrices.clear();
+        self.matrices.truncate(self.skip + self.stride);
         self.keys.clear();
         match &mut self.index {
             Index::Direct(slots) => slots.fill(0),
