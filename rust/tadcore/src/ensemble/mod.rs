@@ -1,9 +1,9 @@
 //! Many games of one policy, outcomes only, in lockstep.
 //!
 //! The trials are cut into chunks of at most [`CHUNK`]; a chunk's states fit the second cache, and at each instant the
-//! part of the table in use fits the first. Chunks are played by a pool of threads made for the call; what a trial does
-//! depends on its own row and on nothing else, so the outcomes are the same bits for any number of threads and any way
-//! of cutting.
+//! part of the table in use fits the first, while the next instant's is on its way. Chunks are played by a pool of
+//! threads made for the call; what a trial does depends on its own row and on nothing else, so the outcomes are the
+//! same bits for any number of threads and any way of cutting.
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|

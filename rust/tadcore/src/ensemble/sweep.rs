@@ -15,7 +15,8 @@ use super::vector::{Wide256, Wide512};
 use crate::policy::shelf::{DIRECT_BITS, Shelf};
 use crate::width::Width;
 
-/// Strips that are looked at before any of them moves: their states (8 KiB with four rows in the plane) stay in the first cache.
+/// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
+/// cache in between.
 const BLOCK: usize = 16;
 
 /// An index that knows no topology.
@@ -141,6 +142,7 @@ fn look_up<const N: usize, const M: usize>(seen: &[u64; LANES], direct: &[u16], 
     Some(slots)
 }
 
+/// One step of the strips from one on, as far as they can move: a [`Sweep`].
 #[inline(always)]
 fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
     strips: &mut Strips,
@@ -195,7 +197,9 @@ fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usi
 /// A sweep compiled for its sizes and for a width's registers.
 fn sized<const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(width: Width) -> Sweep {
     match width {
-        Width::Baseline => |_, strips, from, shelf, next, keys| sweep::<Plain, N, M, D, Q, E>(strips, from, shelf, next, keys),
+        Width::Baseline => {
+            |_, strips, from, shelf, next, keys| sweep::<Plain, N, M, D, Q, E>(strips, from, shelf, next, keys)
+        }
         #[cfg(target_arch = "x86_64")]
         Width::Avx2 => {
             #[target_feature(enable = "avx2")]
@@ -290,6 +294,54 @@ mod tests {
                 let reach = Reach::new(&[2, 3, 4].map(|i| radii[(l + i + turn) % radii.len()]));
                 assert_eq!(reach.ends(&state, 2).is_some(), caught >> l & 1 == 1);
             }
+        }
+    }
+
+    /// Stops, keys and states are those of the version that takes one strip after another, at every width.
+    #[test]
+    fn blocks_stop_where_single_strips_do() {
+        let shape = Shape { size: 4, rows: 3, dim: 2, words: 1 };
+        let wave = |i: usize| (1.7 * i as f64).sin();
+        let mut shelf = Shelf::new(3, 4);
+        for key in (0..1 << 12).filter(|key| key % 11 != 3) {
+            let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
+            shelf.insert(&[key as u64], &matrix);
+        }
+        let strips = || Strips {
+            z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
+            sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
+            capture: vec![[0.01; LANES]; 4],
+            sight_step: 0,
+            capture_step: 0,
+            live: 40 * LANES - 3,
+        };
+        for width in Width::all() {
+            let (mut ours, mut single) = (strips(), strips());
+            let (mut keys, mut expected) = (vec![[0; LANES]], vec![[0; LANES]]);
+            let (mut from, mut counts) = (0, [0; 2]);
+            loop {
+                let stop = sweep_of(&shape, width)(&shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
+                assert_eq!(stop, sweep_any(&shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
+                assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
+                match stop {
+                    Stop::End => break,
+                    Stop::Caught(strip, _) => {
+                        // All eight a long way off, where nobody sees or catches anybody.
+                        for all in [&mut ours, &mut single] {
+                            all.z[8 * strip..][..8]
+                                .iter_mut()
+                                .enumerate()
+                                .for_each(|(e, z)| *z = [10.0 * (1 + e) as f64; 8]);
+                        }
+                        (from, counts[0]) = (strip, counts[0] + 1);
+                    }
+                    Stop::Missing(strip) => {
+                        assert_eq!(keys, expected);
+                        (from, counts[1]) = (strip + 1, counts[1] + 1);
+                    }
+                }
+            }
+            assert!(counts.iter().all(|&count| count > 3 && count < 30), "{counts:?}");
         }
     }
 }

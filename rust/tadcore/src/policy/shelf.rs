@@ -257,6 +257,7 @@ mod tests {
                 assert_eq!(slot, i as usize + 1);
                 assert!(shelf.matrix(slot).iter().all(|&x| x == i as f64));
             }
+            assert_eq!(shelf.matrices().as_ptr().align_offset(LINE), 0);
             assert_eq!(shelf.find(&key(3000)), 0);
             shelf.clear();
             assert_eq!((shelf.find(&key(5)), shelf.len()), (0, 0));
