@@ -29,7 +29,7 @@ use crate::width::Width;
 use chunk::{Chunk, End, Worker};
 
 /// Trials of one chunk at most.
-pub const CHUNK: usize = 4096;
+pub const CHUNK: usize = 8192;
 
 /// Positions and radii of M games; radii are M rows, or one row shared by all.
 #[derive(Debug, Clone, Copy)]
@@ -105,7 +105,9 @@ fn play(
     ends: &mut [End],
     cancel: &CancelToken,
 ) -> Result<(), RunError> {
-    let size = ends.len().div_ceil(threads).clamp(1, CHUNK);
+    // Equal chunks, as many for each thread.
+    let rounds = ends.len().div_ceil(threads.saturating_mul(CHUNK)).max(1);
+    let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
     let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
         Chunk::new(policy, batch, c * size, ends.len(), width).play(ends, worker, cancel)
     };

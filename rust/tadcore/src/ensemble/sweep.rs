@@ -19,6 +19,9 @@ use crate::width::Width;
 /// cache in between.
 const BLOCK: usize = 16;
 
+/// Lines of the next instant's shelf that a strip fetches at most: few strips need few entries.
+const MOST_LINES: usize = 8;
+
 /// An index that knows no topology.
 static NOTHING: [u16; 1 << DIRECT_BITS] = [0; 1 << DIRECT_BITS];
 
@@ -155,6 +158,7 @@ fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usi
     let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
     let direct = shelf.direct().get(..places).unwrap_or(&NOTHING[..places]);
     let end = strips.live.div_ceil(LANES);
+    let share = next.map_or(0, |next| next.lines().div_ceil(end.max(1)).min(MOST_LINES));
     let mut slots = [[0; LANES]; BLOCK];
     let mut first = from;
     while first < end {
@@ -162,7 +166,9 @@ fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usi
         while ready < BLOCK.min(end - first) {
             let strip = first + ready;
             if let Some(next) = next {
-                next.prefetch(strip);
+                for line in strip * share..(strip + 1) * share {
+                    next.prefetch(line);
+                }
             }
             let z = &strips.z[strip * N * D..][..N * D];
             let sight = &strips.sight[strip * strips.sight_step..][..M];

@@ -18,6 +18,10 @@ pub(crate) const DIRECT_BITS: usize = 12;
 
 /// Bytes of a cache line.
 const LINE: usize = 64;
+/// Slots of a direct index in one.
+const DIRECT_LINE: usize = LINE / size_of::<u16>();
+/// Numbers of a matrix in one.
+const MATRIX_LINE: usize = LINE / size_of::<f64>();
 
 /// Rows of a stored column for matrices of `n` rows: whole vectors of four.
 #[must_use]
@@ -137,14 +141,18 @@ impl Shelf {
         &self.matrices[self.skip..]
     }
 
-    /// Fetches the i-th part of what lookups read, into the second cache; as many parts as entries make the whole shelf.
+    /// Cache lines that lookups read: the index of a direct shelf, then the matrices.
     #[inline(always)]
-    pub(crate) fn prefetch(&self, i: usize) {
-        for e in (0..self.stride).step_by(LINE / size_of::<f64>()) {
-            prefetch(&self.matrices, self.skip + i * self.stride + e);
-        }
-        if let Index::Direct(slots) = &self.index {
-            prefetch(slots, i * (LINE / size_of::<u16>()));
+    pub(crate) fn lines(&self) -> usize {
+        self.direct().len() / DIRECT_LINE + self.matrices().len().div_ceil(MATRIX_LINE)
+    }
+
+    /// Fetches one of these lines into the second cache.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, line: usize) {
+        match line.checked_sub(self.direct().len() / DIRECT_LINE) {
+            None => prefetch(self.direct(), line * DIRECT_LINE),
+            Some(line) => prefetch(&self.matrices, self.skip + line * MATRIX_LINE),
         }
     }
 
@@ -207,7 +215,7 @@ impl Shelf {
     /// Doubles the room for matrices; slot 0 is there from the beginning.
     fn grow(&mut self) {
         let held = self.matrices().len().max(self.stride);
-        let most = LINE / size_of::<f64>() - 1;
+        let most = MATRIX_LINE - 1;
         let mut larger = Vec::<f64>::with_capacity(2 * held + most);
         let skip = larger.as_ptr().align_offset(LINE).min(most);
         larger.resize(skip, 0.0);
