@@ -307,16 +307,17 @@ mod tests {
     #[test]
     fn blocks_stop_where_single_strips_do() {
         let shape = Shape { size: 4, rows: 3, dim: 2, words: 1 };
-        let wave = |i: usize| (1.7 * i as f64).sin();
+        // In (−1, 1), without a pattern.
+        let wave = |i: usize| ((12.9898 * i as f64 + 4.1).sin() * 43758.5453).fract();
         let mut shelf = Shelf::new(3, 4);
-        for key in (0..1 << 12).filter(|key| key % 11 != 3) {
+        for key in (0..1 << 12).filter(|key| key % 41 != 3) {
             let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
             shelf.insert(&[key as u64], &matrix);
         }
         let strips = || Strips {
             z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
             sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
-            capture: vec![[0.01; LANES]; 4],
+            capture: vec![[0.04; LANES]; 4],
             sight_step: 0,
             capture_step: 0,
             live: 40 * LANES - 3,
