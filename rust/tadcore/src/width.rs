@@ -1,14 +1,16 @@
 //! How wide the processor's vectors are: hot loops are compiled for each width, and the processor decides at run time.
 //!
-//! Only the width differs: the operations and their order are the same and none is fused, so every width gives the
-//! same bits.
+//! Only the width differs: the operations and their order are the same, so every width gives the same bits. In
+//! `widened!` none is fused. In `fused!` the body says where a product and a sum are one operation, by
+//! `f64::mul_add`, which is rounded correctly on every machine: an instruction from 256 bits on, a slow library call on
+//! an old processor that lacks it.
 
 /// Which instructions the processor has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Width {
     /// Whatever the target guarantees.
     Baseline,
-    /// 256 bits; only made by [`Width::detect`] after asking the processor.
+    /// 256 bits and fused operations; only made by [`Width::detect`] after asking the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
     /// 512 bits, and all of the above; only made by [`Width::detect`].
@@ -26,13 +28,21 @@ impl Width {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = vec![Self::Baseline];
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
             all.push(Self::Avx2);
             if std::arch::is_x86_feature_detected!("avx512f") {
                 all.push(Self::Avx512);
             }
         }
         all
+    }
+
+    /// Whether one register holds eight numbers.
+    pub(crate) fn holds_eight(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        return self == Self::Avx512;
+        #[cfg(not(target_arch = "x86_64"))]
+        false
     }
 }
 
@@ -61,3 +71,34 @@ macro_rules! widened {
     };
 }
 pub(crate) use widened;
+
+/// Defines a function by a body with `mul_add`, compiled for every width.
+macro_rules! fused {
+    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
+        $(#[$doc])*
+        $vis fn $name $(<$(const $g: usize),*>)? (width: $crate::width::Width, $($arg: $ty),*) $(-> $ret)? {
+            #[inline(always)]
+            fn body $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? $body
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma")]
+            fn avx2 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
+                body $(::<$($g),*>)? ($($arg),*)
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx2,fma")]
+            fn avx512 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
+                body $(::<$($g),*>)? ($($arg),*)
+            }
+            match width {
+                $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
+                $crate::width::Width::Avx2 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: this variant exists only where the processor said that it has AVX-512F, AVX2 and FMA.
+                $crate::width::Width::Avx512 => unsafe { avx512 $(::<$($g),*>)? ($($arg),*) },
+            }
+        }
+    };
+}
+pub(crate) use fused;
