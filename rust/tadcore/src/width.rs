@@ -1,9 +1,7 @@
 //! How wide the processor's vectors are: hot loops are compiled for each width, and the processor decides at run time.
 //!
 //! Only the width differs: the operations and their order are the same, so every width gives the same bits. In
-//! `widened!` none is fused. In `fused!` the body says where a product and a sum are one operation, by
-//! `f64::mul_add`, which is rounded correctly on every machine: an instruction from 256 bits on, a slow library call on
-//! an old processor that lacks it.
+//! `widened!` no operation is fused with another.
 
 /// Which instructions the processor has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,14 +34,6 @@ impl Width {
         }
         all
     }
-
-    /// Whether one register holds eight numbers.
-    pub(crate) fn holds_eight(self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        return self == Self::Avx512;
-        #[cfg(not(target_arch = "x86_64"))]
-        false
-    }
 }
 
 /// Defines a function by a body compiled for 128 and for 256 bits; wider registers did not pay in these loops.
@@ -71,34 +61,3 @@ macro_rules! widened {
     };
 }
 pub(crate) use widened;
-
-/// Defines a function by a body with `mul_add`, compiled for every width.
-macro_rules! fused {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
-        $(#[$doc])*
-        $vis fn $name $(<$(const $g: usize),*>)? (width: $crate::width::Width, $($arg: $ty),*) $(-> $ret)? {
-            #[inline(always)]
-            fn body $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? $body
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2,fma")]
-            fn avx2 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
-                body $(::<$($g),*>)? ($($arg),*)
-            }
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx2,fma")]
-            fn avx512 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
-                body $(::<$($g),*>)? ($($arg),*)
-            }
-            match width {
-                $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
-                $crate::width::Width::Avx2 => unsafe { avx2 $(::<$($g),*>)? ($($arg),*) },
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: this variant exists only where the processor said that it has AVX-512F, AVX2 and FMA.
-                $crate::width::Width::Avx512 => unsafe { avx512 $(::<$($g),*>)? ($($arg),*) },
-            }
-        }
-    };
-}
-pub(crate) use fused;

@@ -24,11 +24,12 @@
 use super::dop853::{self, Flow};
 use super::lanes::LANES;
 use super::large::Large;
+use super::register::fused;
 use super::{finite, triangle, weight};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
-use crate::width::{Width, fused};
+use crate::width::Width;
 
 /// Local error per step, in the weighted norm of [`dop853`]. Over 196 random games (n = 1…12, weights within two orders of
 /// magnitude) this keeps every node to 4e-12, in the median to 4e-13; else to what the conditioning of the game allows.
@@ -140,7 +141,7 @@ fn add_transpose<const B: usize>(tiles: usize, stride: usize, g: &[f64], out: &m
 
 fused! {
     #[inline(never)]
-    fn small<const N: usize, const L: usize, const R: usize, const B: usize>(flow: &mut Small<N, L, R, B>, y: &[f64], dy: &mut [f64]) {
+    fn small<V, const N: usize, const L: usize, const R: usize, const B: usize>(flow: &mut Small<N, L, R, B>, y: &[f64], dy: &mut [f64]) {
         flow.evaluate(y, dy);
     }
 }

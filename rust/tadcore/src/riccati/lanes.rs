@@ -9,8 +9,8 @@
 //!
 //! Source: the method of `dop853`; the layout is ours, by measurement.
 
+use super::register::{Pack, Registers, fused};
 use super::tableau as t;
-use crate::width::fused;
 
 /// Entries handled together.
 pub(super) const LANES: usize = 8;
@@ -35,51 +35,45 @@ fn stages<'a, T, const M: usize>(k: &'a [f64], len: usize, row: &[(usize, T); M]
     std::array::from_fn(|j| &lanes(&k[row[j].0 * len..][..len])[..len / LANES])
 }
 
-/// a x + y, entry by entry.
-#[inline(always)]
-fn add(a: f64, x: &Lane, y: Lane) -> Lane {
-    std::array::from_fn(|c| a.mul_add(x[c], y[c]))
-}
-
 /// Σ_j a_j k_j at lane i.
 #[inline(always)]
-fn sum<const M: usize>(k: &[&[Lane]; M], row: &[(usize, f64); M], i: usize) -> Lane {
-    let mut sum = k[0][i].map(|x| row[0].1 * x);
+fn sum<V: Registers, const M: usize>(k: &[&[Lane]; M], row: &[(usize, f64); M], i: usize) -> V::Eight {
+    let mut sum = V::Eight::splat(row[0].1).mul(V::Eight::load(&k[0][i]));
     for j in 1..M {
-        sum = add(row[j].1, &k[j][i], sum);
+        sum = V::Eight::splat(row[j].1).mul_add(V::Eight::load(&k[j][i]), sum);
     }
     sum
 }
 
 #[inline(always)]
-fn step<const M: usize>(out: &mut [f64], y: &[f64], k: &[f64], row: &[(usize, f64); M], h: f64) {
+fn step<V: Registers, const M: usize>(out: &mut [f64], y: &[f64], k: &[f64], row: &[(usize, f64); M], h: f64) {
     let len = out.len();
-    let (out, y, k) = (lanes_mut(out), lanes(&y[..len]), stages(k, len, row));
-    for i in 0..len / LANES {
-        out[i] = add(h, &sum(&k, row, i), y[i]);
+    let (y, k, h) = (&lanes(&y[..len])[..len / LANES], stages(k, len, row), V::Eight::splat(h));
+    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+        h.mul_add(sum::<V, M>(&k, row, i), V::Eight::load(&y[i])).store(out);
     }
 }
 
 fused! {
     /// The point at which stage `i` (from zero) is evaluated; 12 is the new point.
     #[inline(never)]
-    pub(super) fn point(i: usize, out: &mut [f64], y: &[f64], k: &[f64], h: f64) {
+    pub(super) fn point<V>(i: usize, out: &mut [f64], y: &[f64], k: &[f64], h: f64) {
         match i {
-            1 => step(out, y, k, &t::A2, h),
-            2 => step(out, y, k, &t::A3, h),
-            3 => step(out, y, k, &t::A4, h),
-            4 => step(out, y, k, &t::A5, h),
-            5 => step(out, y, k, &t::A6, h),
-            6 => step(out, y, k, &t::A7, h),
-            7 => step(out, y, k, &t::A8, h),
-            8 => step(out, y, k, &t::A9, h),
-            9 => step(out, y, k, &t::A10, h),
-            10 => step(out, y, k, &t::A11, h),
-            11 => step(out, y, k, &t::A12, h),
-            12 => step(out, y, k, &t::B, h),
-            13 => step(out, y, k, &t::A14, h),
-            14 => step(out, y, k, &t::A15, h),
-            _ => step(out, y, k, &t::A16, h),
+            1 => step::<V, _>(out, y, k, &t::A2, h),
+            2 => step::<V, _>(out, y, k, &t::A3, h),
+            3 => step::<V, _>(out, y, k, &t::A4, h),
+            4 => step::<V, _>(out, y, k, &t::A5, h),
+            5 => step::<V, _>(out, y, k, &t::A6, h),
+            6 => step::<V, _>(out, y, k, &t::A7, h),
+            7 => step::<V, _>(out, y, k, &t::A8, h),
+            8 => step::<V, _>(out, y, k, &t::A9, h),
+            9 => step::<V, _>(out, y, k, &t::A10, h),
+            10 => step::<V, _>(out, y, k, &t::A11, h),
+            11 => step::<V, _>(out, y, k, &t::A12, h),
+            12 => step::<V, _>(out, y, k, &t::B, h),
+            13 => step::<V, _>(out, y, k, &t::A14, h),
+            14 => step::<V, _>(out, y, k, &t::A15, h),
+            _ => step::<V, _>(out, y, k, &t::A16, h),
         }
     }
 }
@@ -87,50 +81,55 @@ fused! {
 fused! {
     /// Σ (w e5)², Σ (w e3)² and Σ (w y)² over the block of entries from `start`.
     #[inline(never)]
-    pub(super) fn error_sums(k: &[f64], y: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
+    pub(super) fn error_sums<V>(k: &[f64], y: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
         let (len, from, count) = (weight.len(), start / LANES, block / LANES);
         let k5 = stages(k, len, &t::E5).map(|k| &k[from..][..count]);
         let k3 = stages(k, len, &t::E3).map(|k| &k[from..][..count]);
         let (y, weight) = (&lanes(y)[from..][..count], &lanes(weight)[from..][..count]);
-        let (mut five, mut three, mut size) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut five, mut three, mut size) = (V::Eight::splat(0.0), V::Eight::splat(0.0), V::Eight::splat(0.0));
         for i in 0..count {
-            let (e5, e3) = (sum(&k5, &t::E5, i), sum(&k3, &t::E3, i));
-            for c in 0..LANES {
-                let (e5, e3, y) = (weight[i][c] * e5[c], weight[i][c] * e3[c], weight[i][c] * y[i][c]);
-                five[c] = e5.mul_add(e5, five[c]);
-                three[c] = e3.mul_add(e3, three[c]);
-                size[c] = y.mul_add(y, size[c]);
-            }
+            let weight = V::Eight::load(&weight[i]);
+            let (e5, e3) = (weight.mul(sum::<V, _>(&k5, &t::E5, i)), weight.mul(sum::<V, _>(&k3, &t::E3, i)));
+            let y = weight.mul(V::Eight::load(&y[i]));
+            five = e5.mul_add(e5, five);
+            three = e3.mul_add(e3, three);
+            size = y.mul_add(y, size);
         }
-        (five.iter().sum(), three.iter().sum(), size.iter().sum())
+        let total = |x: V::Eight| {
+            let mut lanes = [0.0; LANES];
+            x.store(&mut lanes);
+            lanes.iter().sum()
+        };
+        (total(five), total(three), total(size))
     }
 }
 
 fused! {
     /// The dense output's coefficients for the step from `y` to `y_new`.
     #[inline(never)]
-    pub(super) fn dense(out: &mut [f64], y: &[f64], y_new: &[f64], k: &[f64], h: f64) {
+    pub(super) fn dense<V>(out: &mut [f64], y: &[f64], y_new: &[f64], k: &[f64], h: f64) {
         let len = y.len();
         let count = len / LANES;
         let used = stages(k, len, &t::D);
         let (first, last) = (used[0], &lanes(&k[12 * len..13 * len])[..count]);
         let (y, y_new) = (&lanes(y)[..count], &lanes(y_new)[..count]);
         let out = &mut lanes_mut(out)[..DENSE * count];
+        let (h, two) = (V::Eight::splat(h), V::Eight::splat(2.0));
         for i in 0..count {
-            let mut sum = [[0.0; LANES]; 4];
+            let mut sum = [V::Eight::splat(0.0); 4];
             for j in 0..t::D.len() {
-                let k = used[j][i];
+                let k = V::Eight::load(&used[j][i]);
                 for q in 0..4 {
-                    sum[q] = add(t::D[j].1[q], &k, sum[q]);
+                    sum[q] = V::Eight::splat(t::D[j].1[q]).mul_add(k, sum[q]);
                 }
             }
-            let dy: Lane = std::array::from_fn(|c| y_new[i][c] - y[i][c]);
-            let ends: Lane = std::array::from_fn(|c| first[i][c] + last[i][c]);
-            out[i] = dy;
-            out[count + i] = std::array::from_fn(|c| h.mul_add(first[i][c], -dy[c]));
-            out[2 * count + i] = std::array::from_fn(|c| 2.0f64.mul_add(dy[c], -(h * ends[c])));
+            let (first, last) = (V::Eight::load(&first[i]), V::Eight::load(&last[i]));
+            let dy = V::Eight::load(&y_new[i]).sub(V::Eight::load(&y[i]));
+            dy.store(&mut out[i]);
+            h.mul(first).sub(dy).store(&mut out[count + i]);
+            two.mul(dy).sub(h.mul(first.add(last))).store(&mut out[2 * count + i]);
             for q in 0..4 {
-                out[(3 + q) * count + i] = sum[q].map(|x| h * x);
+                h.mul(sum[q]).store(&mut out[(3 + q) * count + i]);
             }
         }
     }
@@ -139,7 +138,7 @@ fused! {
 fused! {
     /// The dense output at M places θ in (0, 1], one after the other in `out`.
     #[inline(never)]
-    pub(super) fn interpolate<const M: usize>(out: &mut [f64], y: &[f64], dense: &[f64], theta: [f64; M]) {
+    pub(super) fn interpolate<V, const M: usize>(out: &mut [f64], y: &[f64], dense: &[f64], theta: [f64; M]) {
         let count = y.len() / LANES;
         let mut weights = [[0.0; DENSE]; M];
         for (row, theta) in weights.iter_mut().zip(theta) {
@@ -152,15 +151,15 @@ fused! {
         let (y, dense) = (&lanes(y)[..count], &lanes(dense)[..DENSE * count]);
         let out = &mut lanes_mut(out)[..M * count];
         for i in 0..count {
-            let mut sum = [y[i]; M];
+            let mut sum = [V::Eight::load(&y[i]); M];
             for j in 0..DENSE {
-                let d = dense[j * count + i];
+                let d = V::Eight::load(&dense[j * count + i]);
                 for m in 0..M {
-                    sum[m] = add(weights[m][j], &d, sum[m]);
+                    sum[m] = V::Eight::splat(weights[m][j]).mul_add(d, sum[m]);
                 }
             }
             for m in 0..M {
-                out[m * count + i] = sum[m];
+                sum[m].store(&mut out[m * count + i]);
             }
         }
     }

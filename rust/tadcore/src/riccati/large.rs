@@ -20,10 +20,11 @@
 use std::ops::Range;
 
 use super::dop853::Flow;
+use super::register::{Pack, Registers, fused};
 use super::triangle::{self, TILE};
 use super::weight;
 use crate::game::Game;
-use crate::width::{Width, fused};
+use crate::width::Width;
 
 pub(super) struct Large {
     width: Width,
@@ -60,13 +61,13 @@ impl Large {
     }
 
     #[inline(always)]
-    fn evaluate<const R: usize>(&mut self, y: &[f64], dy: &mut [f64]) {
+    fn evaluate<V: Registers>(&mut self, y: &[f64], dy: &mut [f64]) {
         let (n, l, block) = (self.n, self.stride, triangle::len(self.tiles));
         for (p, y) in self.p.iter_mut().zip(y.chunks_exact(block)) {
             // Row N may be a row of padding: it is written after the matrix.
-            triangle::expand(self.tiles, y, p);
+            triangle::expand::<V>(self.tiles, y, p);
             let (rows, sums) = p.split_at_mut(n * l);
-            row_sums(rows, l, &mut sums[..l]);
+            row_sums::<V>(rows, l, &mut sums[..l]);
         }
         let m = self.m.chunks_exact_mut(l);
         let target = &self.p[1][(n - 1) * l..n * l];
@@ -82,7 +83,7 @@ impl Large {
         for (p, own) in own.into_iter().enumerate() {
             let update = Update { p: &self.p[p][..(n + 1) * l], m: &self.m, l, own };
             let out = &mut dy[p * block..(p + 1) * block];
-            update.lower::<R>(self.tiles, out);
+            update.lower::<V>(self.tiles, out);
             for (i, q) in self.q[p].iter().enumerate() {
                 out[triangle::row(i) + i] += q;
             }
@@ -93,16 +94,14 @@ impl Large {
 
 /// P 1, as the sum of the rows of a symmetric P.
 #[inline(always)]
-fn row_sums(rows: &[f64], l: usize, out: &mut [f64]) {
+fn row_sums<V: Registers>(rows: &[f64], l: usize, out: &mut [f64]) {
+    let rows = rows.as_chunks::<TILE>().0;
     for (s, out) in out.as_chunks_mut::<TILE>().0.iter_mut().enumerate() {
-        let mut sum = [[0.0; TILE]; 2];
-        for (k, row) in rows.chunks_exact(l).enumerate() {
-            let row = row.as_chunks::<TILE>().0[s];
-            for c in 0..TILE {
-                sum[k % 2][c] += row[c];
-            }
+        let mut sum = [V::Four::splat(0.0); 2];
+        for (k, row) in rows[s..].iter().step_by(l / TILE).enumerate() {
+            sum[k % 2] = sum[k % 2].add(V::Four::load(row));
         }
-        *out = std::array::from_fn(|c| sum[0][c] + sum[1][c]);
+        sum[0].add(sum[1]).store(out);
     }
 }
 
@@ -115,73 +114,77 @@ struct Update<'a> {
 }
 
 impl Update<'_> {
-    /// All entries on and below the diagonal, eight columns by R rows where there are as many.
+    /// All entries on and below the diagonal.
     #[inline(always)]
-    fn lower<const R: usize>(&self, tiles: usize, out: &mut [f64]) {
+    fn lower<V: Registers>(&self, tiles: usize, out: &mut [f64]) {
+        let rows = tiles * TILE;
         let mut i = 0;
-        while i < tiles * TILE {
-            let height = R.min(tiles * TILE - i);
+        while i < rows {
+            let tall = V::ROWS == 8 && i + 8 <= rows;
+            let end = if tall { i + 8 } else { i + 4 };
             let mut j = 0;
-            while j + 8 <= i + height {
-                if height == R {
-                    self.tile::<R, 8>(i, j, out);
+            while j + 8 <= end {
+                if tall {
+                    self.tile::<V::Eight, 8, 8>(i, j, out);
                 } else {
-                    self.tile::<TILE, 8>(i, j, out);
+                    self.tile::<V::Eight, 4, 8>(i, j, out);
                 }
                 j += 8;
             }
-            if j < i + height {
-                self.tile::<TILE, TILE>(i, j, out);
+            if j < end {
+                self.tile::<V::Four, 4, 4>(i, j, out);
             }
-            i += height;
+            i = end;
         }
     }
 
     /// R rows from row i, W columns from column j.
     #[inline(always)]
-    fn tile<const R: usize, const W: usize>(&self, i: usize, j: usize, out: &mut [f64]) {
-        let l = self.l;
+    fn tile<P: Pack<W>, const R: usize, const W: usize>(&self, i: usize, j: usize, out: &mut [f64]) {
         let rows = |r: Range<usize>| {
-            self.p[r.start * l..r.end * l].chunks_exact(l).zip(self.m[r.start * l..r.end * l].chunks_exact(l))
+            let (start, end) = (r.start * self.l, r.end * self.l);
+            self.p[start..end].chunks_exact(self.l).zip(self.m[start..end].chunks_exact(self.l))
         };
-        let mut sum = [[0.0; W]; R];
-        for half in [0..self.own.start, self.own.end..self.p.len() / l] {
-            for (p, m) in rows(half) {
-                add::<R, W>(&p[i..], &m[j..], &mut sum);
-                add::<R, W>(&m[i..], &p[j..], &mut sum);
-            }
+        let mut sum = [[0.0; W]; R].map(|x| P::load(&x));
+        for (p, m) in rows(0..self.own.start).chain(rows(self.own.end..self.p.len() / self.l)) {
+            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
+            sum = add::<P, R, W>(&m[i..], &p[j..], sum);
         }
         for (p, m) in rows(self.own.clone()) {
-            add::<R, W>(&p[i..], &m[j..], &mut sum);
+            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
         }
         for r in 0..R {
-            // The first four rows of a tile on the diagonal end with the diagonal's own tile of 4 × 4.
-            let width = W.min(TILE * ((i + r) / TILE + 1) - j);
             let out = &mut out[triangle::row(i + r) + j..];
-            if width == W {
-                out[..W].copy_from_slice(&sum[r]);
+            if j + W <= TILE * ((i + r) / TILE + 1) {
+                if let Some(out) = out.first_chunk_mut() {
+                    sum[r].store(out);
+                }
             } else {
-                out[..TILE].copy_from_slice(&sum[r][..TILE]);
+                // The first four rows of a tile on the diagonal end with the diagonal's own tile of 4 × 4.
+                let mut row = [0.0; W];
+                sum[r].store(&mut row);
+                out[..TILE].copy_from_slice(&row[..TILE]);
             }
         }
     }
 }
 
-/// sum += leftᵀ right.
+/// sum + leftᵀ right.
 #[inline(always)]
-fn add<const R: usize, const W: usize>(left: &[f64], right: &[f64], sum: &mut [[f64; W]; R]) {
-    let (left, right) = (&left[..R], &right[..W]);
-    for r in 0..R {
-        for c in 0..W {
-            sum[r][c] = left[r].mul_add(right[c], sum[r][c]);
+fn add<P: Pack<W>, const R: usize, const W: usize>(left: &[f64], right: &[f64], mut sum: [P; R]) -> [P; R] {
+    if let (Some(left), Some(right)) = (left.first_chunk::<R>(), right.first_chunk::<W>()) {
+        let right = P::load(right);
+        for r in 0..R {
+            sum[r] = P::splat(left[r]).mul_add(right, sum[r]);
         }
     }
+    sum
 }
 
 fused! {
     #[inline(never)]
-    fn evaluate<const R: usize>(flow: &mut Large, y: &[f64], dy: &mut [f64]) {
-        flow.evaluate::<R>(y, dy);
+    fn evaluate<V>(flow: &mut Large, y: &[f64], dy: &mut [f64]) {
+        flow.evaluate::<V>(y, dy);
     }
 }
 
@@ -190,12 +193,7 @@ impl Flow for Large {
         triangle::len(self.tiles)
     }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
-        // Sixteen registers hold 4 × 8 sums of four numbers each and what goes into them; thirty-two hold 8 × 8 of eight.
-        if self.width.holds_eight() {
-            evaluate::<8>(self.width, self, y, dy);
-        } else {
-            evaluate::<4>(self.width, self, y, dy);
-        }
+        evaluate(self.width, self, y, dy);
     }
     fn weigh(&mut self, y: &[f64], out: &mut [f64]) {
         weight::triangle(y, self.tiles, &mut self.sizes, out);

@@ -37,6 +37,7 @@ mod escape;
 mod hamiltonian;
 mod lanes;
 mod large;
+mod register;
 mod residual;
 mod tableau;
 mod triangle;

@@ -6,11 +6,10 @@
 //!
 //! Source: ours, by measurement.
 
-use crate::width::fused;
+use super::register::{Pack, Registers, fused};
 
 /// Rows and columns of a tile.
 pub(super) const TILE: usize = 4;
-type Tile = [[f64; TILE]; TILE];
 
 /// Tiles along a side of an N × N matrix.
 pub(super) fn tiles(n: usize) -> usize {
@@ -31,7 +30,7 @@ pub(super) fn row(i: usize) -> usize {
 
 /// Writes the whole matrix in rows of 4 · `tiles` entries.
 #[inline(always)]
-pub(super) fn expand(tiles: usize, triangle: &[f64], whole: &mut [f64]) {
+pub(super) fn expand<V: Registers>(tiles: usize, triangle: &[f64], whole: &mut [f64]) {
     let triangle = triangle.as_chunks::<TILE>().0;
     let whole = whole.as_chunks_mut::<TILE>().0;
     let mut at = 0;
@@ -39,13 +38,14 @@ pub(super) fn expand(tiles: usize, triangle: &[f64], whole: &mut [f64]) {
         let stride = i + 1;
         let rows = &triangle[at..at + TILE * stride];
         for j in 0..stride {
-            let tile: Tile = std::array::from_fn(|r| rows[r * stride + j]);
+            let tile: [V::Four; TILE] = std::array::from_fn(|r| V::Four::load(&rows[r * stride + j]));
             for r in 0..TILE {
-                whole[(TILE * i + r) * tiles + j] = tile[r];
+                tile[r].store(&mut whole[(TILE * i + r) * tiles + j]);
             }
             if j < i {
+                let columns = V::transpose(tile);
                 for c in 0..TILE {
-                    whole[(TILE * j + c) * tiles + i] = std::array::from_fn(|r| tile[r][c]);
+                    columns[c].store(&mut whole[(TILE * j + c) * tiles + i]);
                 }
             }
         }
@@ -68,10 +68,10 @@ pub(super) fn mirror_diagonal(tiles: usize, triangle: &mut [f64]) {
 
 fused! {
     /// Writes the N × N matrix. `whole` is work space.
-    pub(super) fn unpack(n: usize, triangle: &[f64], whole: &mut Vec<f64>, out: &mut [f64]) {
+    pub(super) fn unpack<V>(n: usize, triangle: &[f64], whole: &mut Vec<f64>, out: &mut [f64]) {
         let (tiles, stride) = (tiles(n), n.next_multiple_of(TILE));
         whole.resize(stride * stride, 0.0);
-        expand(tiles, triangle, whole);
+        expand::<V>(tiles, triangle, whole);
         for (i, row) in out.chunks_exact_mut(n).enumerate() {
             row.copy_from_slice(&whole[i * stride..][..n]);
         }
@@ -80,6 +80,7 @@ fused! {
 
 #[cfg(test)]
 mod tests {
+    use super::super::register::Plain;
     use super::*;
     use crate::width::Width;
 
@@ -91,7 +92,7 @@ mod tests {
             let mut triangle: Vec<f64> = (0..len(tiles)).map(|i| i as f64).collect();
             mirror_diagonal(tiles, &mut triangle);
             let mut whole = vec![f64::NAN; stride * stride];
-            expand(tiles, &triangle, &mut whole);
+            expand::<Plain>(tiles, &triangle, &mut whole);
             for i in 0..stride {
                 for j in 0..stride {
                     assert_eq!(whole[i * stride + j], triangle[row(i.max(j)) + i.min(j)], "{n}: {i}, {j}");

@@ -85,7 +85,7 @@ mod tests {
             let mut y: Vec<f64> = (0..triangle::len(tiles)).map(|i| 40.0 * (0.7 + i as f64).sin()).collect();
             triangle::mirror_diagonal(tiles, &mut y);
             let mut full = vec![0.0; stride * stride];
-            triangle::expand(tiles, &y, &mut full);
+            triangle::expand::<super::super::register::Plain>(tiles, &y, &mut full);
             let (mut sizes, mut w, mut w_full) = (vec![0.0; stride], vec![0.0; y.len()], vec![0.0; full.len()]);
             triangle(&y, tiles, &mut sizes, &mut w);
             whole(&full, stride, &mut sizes, &mut w_full);
