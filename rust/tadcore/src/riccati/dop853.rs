@@ -16,6 +16,7 @@
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4 to II.6.
 
+use super::aligned::Aligned;
 use super::escape;
 use super::lanes::{self, DENSE, STAGES};
 use crate::cancel::CancelToken;
@@ -50,25 +51,27 @@ struct Workspace {
     width: Width,
     len: usize,
     block: usize,
-    y: Vec<f64>,
-    y_new: Vec<f64>,
-    point: Vec<f64>,
-    k: Vec<f64>,
-    dense: Vec<f64>,
+    y: Aligned,
+    y_new: Aligned,
+    point: Aligned,
+    k: Aligned,
+    dense: Aligned,
 }
 
 impl Workspace {
     fn new(y0: &[f64], block: usize) -> Self {
         let len = y0.len();
+        let mut y = Aligned::zeros(len);
+        y.copy_from_slice(y0);
         Self {
             width: Width::detect(),
             len,
             block,
-            y: y0.to_vec(),
-            y_new: vec![0.0; len],
-            point: vec![0.0; TOGETHER * len],
-            k: vec![0.0; STAGES * len],
-            dense: vec![0.0; DENSE * len],
+            y,
+            y_new: Aligned::zeros(len),
+            point: Aligned::zeros(TOGETHER * len),
+            k: Aligned::zeros(STAGES * len),
+            dense: Aligned::zeros(DENSE * len),
         }
     }
 

@@ -19,6 +19,7 @@
 
 use std::ops::Range;
 
+use super::aligned::Aligned;
 use super::dop853::Flow;
 use super::register::{Pack, Registers, fused};
 use super::triangle::{self, TILE};
@@ -35,8 +36,8 @@ pub(super) struct Large {
     minus_inv_rd: Vec<f64>,
     minus_inv_rtau: f64,
     minus_inv_ra: f64,
-    p: [Vec<f64>; 3],
-    m: Vec<f64>,
+    p: [Aligned; 3],
+    m: Aligned,
     sizes: Vec<f64>,
 }
 
@@ -54,8 +55,8 @@ impl Large {
             minus_inv_rtau: -1.0 / w.r_tau,
             minus_inv_ra: -1.0 / w.r_a,
             // The rows past N are zeros, but for row N, which holds the sum of the others.
-            p: std::array::from_fn(|_| vec![0.0; (stride + 1) * stride]),
-            m: vec![0.0; (n + 1) * stride],
+            p: std::array::from_fn(|_| Aligned::zeros((stride + 1) * stride)),
+            m: Aligned::zeros((n + 1) * stride),
             sizes: vec![0.0; stride],
         }
     }
@@ -64,10 +65,11 @@ impl Large {
     fn evaluate<V: Registers>(&mut self, y: &[f64], dy: &mut [f64]) {
         let (n, l, block) = (self.n, self.stride, triangle::len(self.tiles));
         for (p, y) in self.p.iter_mut().zip(y.chunks_exact(block)) {
-            // Row N may be a row of padding: it is written after the matrix.
-            triangle::expand::<V>(self.tiles, y, p);
-            let (rows, sums) = p.split_at_mut(n * l);
-            row_sums::<V>(rows, l, &mut sums[..l]);
+            let (rows, spare) = p.split_at_mut(l * l);
+            triangle::expand::<V>(self.tiles, y, rows);
+            row_sums::<V>(rows, l, spare);
+            // Row N, which may be one of padding, takes them once the matrix is read.
+            p.copy_within(l * l.., n * l);
         }
         let m = self.m.chunks_exact_mut(l);
         let target = &self.p[1][(n - 1) * l..n * l];
@@ -92,16 +94,18 @@ impl Large {
     }
 }
 
-/// P 1, as the sum of the rows of a symmetric P.
+/// P 1, as the sum of the rows of a symmetric P, a multiple of four of them.
 #[inline(always)]
 fn row_sums<V: Registers>(rows: &[f64], l: usize, out: &mut [f64]) {
-    let rows = rows.as_chunks::<TILE>().0;
+    let tiles = l / TILE;
     for (s, out) in out.as_chunks_mut::<TILE>().0.iter_mut().enumerate() {
-        let mut sum = [V::Four::splat(0.0); 2];
-        for (k, row) in rows[s..].iter().step_by(l / TILE).enumerate() {
-            sum[k % 2] = sum[k % 2].add(V::Four::load(row));
+        let mut sum = [V::Four::splat(0.0); TILE];
+        for four in rows.as_chunks::<TILE>().0.chunks_exact(TILE * tiles) {
+            for r in 0..TILE {
+                sum[r] = sum[r].add(V::Four::load(&four[r * tiles + s]));
+            }
         }
-        sum[0].add(sum[1]).store(out);
+        sum[0].add(sum[1]).add(sum[2].add(sum[3])).store(out);
     }
 }
 
@@ -123,7 +127,7 @@ impl Update<'_> {
             let tall = V::ROWS == 8 && i + 8 <= rows;
             let end = if tall { i + 8 } else { i + 4 };
             let mut j = 0;
-            while j + 8 <= end {
+            while j + 8 <= if tall { i } else { end } {
                 if tall {
                     self.tile::<V::Eight, 8, 8>(i, j, out);
                 } else {
@@ -131,40 +135,64 @@ impl Update<'_> {
                 }
                 j += 8;
             }
-            if j < end {
+            if tall {
+                self.diagonal::<V>(i, out);
+            } else if j < end {
                 self.tile::<V::Four, 4, 4>(i, j, out);
             }
             i = end;
         }
     }
 
+    /// The rows of p and μ of terms that count twice, and those that count once.
+    #[inline(always)]
+    fn rows(&self, r: Range<usize>) -> impl Iterator<Item = (&[f64], &[f64])> {
+        let (start, end) = (r.start * self.l, r.end * self.l);
+        self.p[start..end].chunks_exact(self.l).zip(self.m[start..end].chunks_exact(self.l))
+    }
+
     /// R rows from row i, W columns from column j.
     #[inline(always)]
     fn tile<P: Pack<W>, const R: usize, const W: usize>(&self, i: usize, j: usize, out: &mut [f64]) {
-        let rows = |r: Range<usize>| {
-            let (start, end) = (r.start * self.l, r.end * self.l);
-            self.p[start..end].chunks_exact(self.l).zip(self.m[start..end].chunks_exact(self.l))
-        };
-        let mut sum = [[0.0; W]; R].map(|x| P::load(&x));
-        for (p, m) in rows(0..self.own.start).chain(rows(self.own.end..self.p.len() / self.l)) {
-            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
-            sum = add::<P, R, W>(&m[i..], &p[j..], sum);
-        }
-        for (p, m) in rows(self.own.clone()) {
-            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
-        }
-        for r in 0..R {
-            let out = &mut out[triangle::row(i + r) + j..];
-            if j + W <= TILE * ((i + r) / TILE + 1) {
-                if let Some(out) = out.first_chunk_mut() {
-                    sum[r].store(out);
-                }
-            } else {
-                // The first four rows of a tile on the diagonal end with the diagonal's own tile of 4 × 4.
-                let mut row = [0.0; W];
-                sum[r].store(&mut row);
-                out[..TILE].copy_from_slice(&row[..TILE]);
+        let mut sum = [P::splat(0.0); R];
+        for twice in [0..self.own.start, self.own.end..self.p.len() / self.l] {
+            for (p, m) in self.rows(twice) {
+                sum = add::<P, R, W>(&p[i..], &m[j..], sum);
+                sum = add::<P, R, W>(&m[i..], &p[j..], sum);
             }
+        }
+        for (p, m) in self.rows(self.own.clone()) {
+            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
+        }
+        store(sum, i, j, out);
+    }
+
+    /// Eight rows from row i, up to the diagonal: four of them have four columns, and the others eight.
+    #[inline(always)]
+    fn diagonal<V: Registers>(&self, i: usize, out: &mut [f64]) {
+        let (mut top, mut low) = ([V::Four::splat(0.0); 4], [V::Eight::splat(0.0); 4]);
+        for twice in [0..self.own.start, self.own.end..self.p.len() / self.l] {
+            for (p, m) in self.rows(twice) {
+                let (p, m) = (&p[i..i + 8], &m[i..i + 8]);
+                (top, low) = (add(p, m, top), add(&p[4..], m, low));
+                (top, low) = (add(m, p, top), add(&m[4..], p, low));
+            }
+        }
+        for (p, m) in self.rows(self.own.clone()) {
+            let (p, m) = (&p[i..i + 8], &m[i..i + 8]);
+            (top, low) = (add(p, m, top), add(&p[4..], m, low));
+        }
+        store(top, i, i, out);
+        store(low, i + 4, i, out);
+    }
+}
+
+/// Writes R rows from row i, W columns from column j.
+#[inline(always)]
+fn store<P: Pack<W>, const R: usize, const W: usize>(sum: [P; R], i: usize, j: usize, out: &mut [f64]) {
+    for r in 0..R {
+        if let Some(out) = out[triangle::row(i + r) + j..].first_chunk_mut() {
+            sum[r].store(out);
         }
     }
 }

@@ -31,6 +31,7 @@
 //!
 //! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node.
 
+mod aligned;
 mod coupled;
 mod dop853;
 mod escape;
