@@ -178,9 +178,9 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         7 => small!(7, 8, 4, 4),
         8 => small!(8, 8, 4, 4),
         _ => {
-            let mut whole = Vec::new();
-            let unpack = &mut |block: &[f64], out: &mut [f64]| triangle::unpack(width, n, block, &mut whole, out);
-            run(&mut Large::new(game, width), |i| triangle::row(i) + i, unpack, game, cancel, nodes)
+            let mut panels = Vec::new();
+            let unpack = &mut |block: &[f64], out: &mut [f64]| triangle::unpack(width, n, block, &mut panels, out);
+            run(&mut Large::new(game, width), |i| triangle::entry(i, i), unpack, game, cancel, nodes)
         }
     }
 }
@@ -271,7 +271,7 @@ mod tests {
                 for j in 0..7 {
                     y_whole[p * whole + i * 8 + j] = entry(p, i, j);
                     if j / 4 <= i / 4 {
-                        y[p * block + triangle::row(i) + j] = entry(p, i, j);
+                        y[p * block + triangle::entry(i, j)] = entry(p, i, j);
                     }
                 }
             }
@@ -282,7 +282,7 @@ mod tests {
         for p in 0..3 {
             for i in 0..7 {
                 for j in 0..=i {
-                    let (a, b) = (dy[p * block + triangle::row(i) + j], dy_whole[p * whole + i * 8 + j]);
+                    let (a, b) = (dy[p * block + triangle::entry(i, j)], dy_whole[p * whole + i * 8 + j]);
                     assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{p}, {i}, {j}: {a} and {b}");
                 }
             }

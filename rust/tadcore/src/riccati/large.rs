@@ -11,31 +11,30 @@
 //!
 //! | symbol | name here | meaning |
 //! |---|---|---|
-//! | P_p[k], v_p | `p` | N rows and one more, of `stride` entries |
+//! | P_p[k], v_p | `p` | N rows and one more, in panels of `height` rows |
 //! | μ_k | `m` | as many |
 //! | Q_p | `q` | running weights, diagonal |
 //!
 //! Source: eq:Riccati of the paper as in [`super::coupled`]; the tiles are ours, by measurement.
 
-use std::ops::Range;
-
 use super::aligned::Aligned;
 use super::dop853::Flow;
 use super::register::{Pack, Registers, fused};
-use super::triangle::{self, TILE};
+use super::triangle::{self, PANEL, TILE};
 use super::weight;
 use crate::game::Game;
 use crate::width::Width;
+
+/// A row of a panel.
+type Row = [f64; PANEL];
 
 pub(super) struct Large {
     width: Width,
     n: usize,
     tiles: usize,
-    stride: usize,
+    height: usize,
     q: Vec<Vec<f64>>,
-    minus_inv_rd: Vec<f64>,
-    minus_inv_rtau: f64,
-    minus_inv_ra: f64,
+    scales: Vec<f64>,
     p: [Aligned; 3],
     m: Aligned,
     sizes: Vec<f64>,
@@ -44,169 +43,215 @@ pub(super) struct Large {
 impl Large {
     pub(super) fn new(game: &Game, width: Width) -> Self {
         let (w, n) = (game.weights(), game.size());
-        let (tiles, stride) = (triangle::tiles(n), n.next_multiple_of(TILE));
+        let tiles = triangle::tiles(n);
+        // With room for row N.
+        let height = TILE * (tiles + 1);
+        let len = tiles.div_ceil(2) * height * PANEL;
         Self {
             width,
             n,
             tiles,
-            stride,
+            height,
             q: game.state_weights(false),
-            minus_inv_rd: w.r_d.iter().map(|r| -1.0 / r).collect(),
-            minus_inv_rtau: -1.0 / w.r_tau,
-            minus_inv_ra: -1.0 / w.r_a,
-            // The rows past N are zeros, but for row N, which holds the sum of the others.
-            p: std::array::from_fn(|_| Aligned::zeros((stride + 1) * stride)),
-            m: Aligned::zeros((n + 1) * stride),
-            sizes: vec![0.0; stride],
+            scales: w.r_d.iter().chain([&w.r_tau, &w.r_a]).map(|r| -1.0 / r).collect(),
+            p: std::array::from_fn(|_| Aligned::zeros(len)),
+            m: Aligned::zeros(len),
+            sizes: vec![0.0; TILE * tiles],
         }
     }
 
     #[inline(always)]
     fn evaluate<V: Registers>(&mut self, y: &[f64], dy: &mut [f64]) {
-        let (n, l, block) = (self.n, self.stride, triangle::len(self.tiles));
+        let (n, tiles, height, block) = (self.n, self.tiles, self.height, triangle::len(self.tiles));
         for (p, y) in self.p.iter_mut().zip(y.chunks_exact(block)) {
-            let (rows, spare) = p.split_at_mut(l * l);
-            triangle::expand::<V>(self.tiles, y, rows);
-            row_sums::<V>(rows, l, spare);
-            // Row N, which may be one of padding, takes them once the matrix is read.
-            p.copy_within(l * l.., n * l);
-        }
-        let m = self.m.chunks_exact_mut(l);
-        let target = &self.p[1][(n - 1) * l..n * l];
-        let attacker = &self.p[2][n * l..(n + 1) * l];
-        let rows = self.p[0].chunks_exact(l).take(n - 1).chain([target, attacker]);
-        let scales = self.minus_inv_rd.iter().chain([&self.minus_inv_rtau, &self.minus_inv_ra]);
-        for ((m, row), scale) in m.zip(rows).zip(scales) {
-            for (m, x) in m.iter_mut().zip(row) {
-                *m = x * scale;
+            triangle::expand::<V>(tiles, height, y, p);
+            for panel in rows_mut(p).chunks_exact_mut(height) {
+                // Row N, which may be one of padding, takes the sum once all are read.
+                let sum = row_sum::<V>(&panel[..TILE * tiles]);
+                sum.store(&mut panel[n]);
             }
         }
-        let own = [0..n - 1, n - 1..n, n..n + 1];
-        for (p, own) in own.into_iter().enumerate() {
-            let update = Update { p: &self.p[p][..(n + 1) * l], m: &self.m, l, own };
+        let [d, target, attacker] = self.p.each_ref().map(|p| rows(p).chunks_exact(height));
+        let panels = rows_mut(&mut self.m).chunks_exact_mut(height);
+        for (((m, d), target), attacker) in panels.zip(d).zip(target).zip(attacker) {
+            let rows = d[..n - 1].iter().chain([&target[n - 1], &attacker[n]]);
+            for ((m, row), scale) in m.iter_mut().zip(rows).zip(&self.scales) {
+                V::Eight::splat(*scale).mul(V::Eight::load(row)).store(m);
+            }
+        }
+        for p in 0..3 {
+            // A term that counts once is half of one that counts twice; halves and doubles are exact.
+            let own = [None, Some(n - 1), Some(n)][p];
+            self.scale(own, 0.5);
             let out = &mut dy[p * block..(p + 1) * block];
-            update.lower::<V>(self.tiles, out);
+            let once = if own.is_none() { n - 1 } else { 0 };
+            Update { p: rows(&self.p[p]), m: rows(&self.m), height, terms: n + 1, once }.lower::<V>(tiles, out);
+            self.scale(own, 2.0);
             for (i, q) in self.q[p].iter().enumerate() {
-                out[triangle::row(i) + i] += q;
+                out[triangle::entry(i, i)] += q;
             }
-            triangle::mirror_diagonal(self.tiles, out);
+        }
+    }
+
+    /// Multiplies a row of μ.
+    #[inline(always)]
+    fn scale(&mut self, row: Option<usize>, by: f64) {
+        if let Some(row) = row {
+            for panel in rows_mut(&mut self.m).chunks_exact_mut(self.height) {
+                panel[row] = panel[row].map(|x| by * x);
+            }
         }
     }
 }
 
-/// P 1, as the sum of the rows of a symmetric P, a multiple of four of them.
+fn rows(panels: &[f64]) -> &[Row] {
+    panels.as_chunks().0
+}
+
+fn rows_mut(panels: &mut [f64]) -> &mut [Row] {
+    panels.as_chunks_mut().0
+}
+
+/// The sum of rows, a multiple of four of them.
 #[inline(always)]
-fn row_sums<V: Registers>(rows: &[f64], l: usize, out: &mut [f64]) {
-    let tiles = l / TILE;
-    for (s, out) in out.as_chunks_mut::<TILE>().0.iter_mut().enumerate() {
-        let mut sum = [V::Four::splat(0.0); TILE];
-        for four in rows.as_chunks::<TILE>().0.chunks_exact(TILE * tiles) {
-            for r in 0..TILE {
-                sum[r] = sum[r].add(V::Four::load(&four[r * tiles + s]));
-            }
+fn row_sum<V: Registers>(rows: &[Row]) -> V::Eight {
+    let mut sum = [V::Eight::splat(0.0); TILE];
+    for four in rows.as_chunks::<TILE>().0 {
+        for r in 0..TILE {
+            sum[r] = sum[r].add(V::Eight::load(&four[r]));
         }
-        sum[0].add(sum[1]).add(sum[2].add(sum[3])).store(out);
     }
+    sum[0].add(sum[1]).add(sum[2].add(sum[3]))
 }
 
-/// Σ_k (pᵀ μ + μᵀ p), the rows of `own` once.
+/// Σ_k (pᵀ μ + μᵀ p) over so many `terms`, the first of them, up to `once`, as pᵀ μ alone.
 struct Update<'a> {
-    p: &'a [f64],
-    m: &'a [f64],
-    l: usize,
-    own: Range<usize>,
+    p: &'a [Row],
+    m: &'a [Row],
+    height: usize,
+    terms: usize,
+    once: usize,
 }
 
-impl Update<'_> {
-    /// All entries on and below the diagonal.
+impl<'a> Update<'a> {
+    /// All tiles on and below the diagonal.
     #[inline(always)]
     fn lower<V: Registers>(&self, tiles: usize, out: &mut [f64]) {
-        let rows = tiles * TILE;
+        let out = &mut out.as_chunks_mut::<TILE>().0.as_chunks_mut::<TILE>().0[..triangle::len(tiles) / (TILE * TILE)];
         let mut i = 0;
-        while i < rows {
-            let tall = V::ROWS == 8 && i + 8 <= rows;
-            let end = if tall { i + 8 } else { i + 4 };
-            let mut j = 0;
-            while j + 8 <= if tall { i } else { end } {
-                if tall {
-                    self.tile::<V::Eight, 8, 8>(i, j, out);
-                } else {
-                    self.tile::<V::Eight, 4, 8>(i, j, out);
+        while i < tiles {
+            let panel = i / 2;
+            if V::ROWS == 8 && i + 2 <= tiles {
+                for j in 0..panel {
+                    let sum = self.product::<V::Eight, 8, 8>((panel, |x| x), (j, |x| x));
+                    let [a, b, c, d, e, f, g, h] = sum;
+                    put_wide::<V>([a, b, c, d], i, j, out);
+                    put_wide::<V>([e, f, g, h], i + 1, j, out);
                 }
-                j += 8;
+                let (top, low) = self.diagonal::<V>(panel);
+                put::<V>(top, i, i, out);
+                put_wide::<V>(low, i + 1, panel, out);
+                i += 2;
+                continue;
             }
-            if tall {
-                self.diagonal::<V>(i, out);
-            } else if j < end {
-                self.tile::<V::Four, 4, 4>(i, j, out);
+            for j in 0..panel {
+                let sum = if i % 2 == 0 {
+                    self.product::<V::Eight, 4, 8>((panel, low), (j, |x| x))
+                } else {
+                    self.product::<V::Eight, 4, 8>((panel, high), (j, |x| x))
+                };
+                put_wide::<V>(sum, i, j, out);
             }
-            i = end;
+            if i % 2 == 0 {
+                put::<V>(self.product::<V::Four, 4, 4>((panel, low), (panel, low)), i, i, out);
+            } else {
+                put_wide::<V>(self.product::<V::Eight, 4, 8>((panel, high), (panel, |x| x)), i, panel, out);
+            }
+            i += 1;
         }
     }
 
-    /// The rows of p and μ of terms that count twice, and those that count once.
+    /// Rows of p and μ of one panel.
     #[inline(always)]
-    fn rows(&self, r: Range<usize>) -> impl Iterator<Item = (&[f64], &[f64])> {
-        let (start, end) = (r.start * self.l, r.end * self.l);
-        self.p[start..end].chunks_exact(self.l).zip(self.m[start..end].chunks_exact(self.l))
+    fn panel(&self, panel: usize) -> (&'a [Row], &'a [Row]) {
+        let start = panel * self.height;
+        (&self.p[start..start + self.terms], &self.m[start..start + self.terms])
     }
 
-    /// R rows from row i, W columns from column j.
+    /// R rows that the first function picks of one panel by W columns that the other picks of another.
     #[inline(always)]
-    fn tile<P: Pack<W>, const R: usize, const W: usize>(&self, i: usize, j: usize, out: &mut [f64]) {
+    fn product<P: Pack<W>, const R: usize, const W: usize>(
+        &self,
+        (i, left): (usize, impl Fn(&Row) -> &[f64; R]),
+        (j, right): (usize, impl Fn(&Row) -> &[f64; W]),
+    ) -> [P; R] {
+        let ((pi, mi), (pj, mj)) = (self.panel(i), self.panel(j));
         let mut sum = [P::splat(0.0); R];
-        for twice in [0..self.own.start, self.own.end..self.p.len() / self.l] {
-            for (p, m) in self.rows(twice) {
-                sum = add::<P, R, W>(&p[i..], &m[j..], sum);
-                sum = add::<P, R, W>(&m[i..], &p[j..], sum);
-            }
+        for (p, m) in pi.iter().zip(mj).take(self.once) {
+            sum = add(left(p), right(m), sum);
         }
-        for (p, m) in self.rows(self.own.clone()) {
-            sum = add::<P, R, W>(&p[i..], &m[j..], sum);
+        for (((pi, mi), pj), mj) in pi.iter().zip(mi).zip(pj).zip(mj).skip(self.once) {
+            sum = add(left(pi), right(mj), sum);
+            sum = add(left(mi), right(pj), sum);
         }
-        store(sum, i, j, out);
+        sum
     }
 
-    /// Eight rows from row i, up to the diagonal: four of them have four columns, and the others eight.
+    /// Eight rows up to the diagonal: four of them have four columns, and the others eight.
     #[inline(always)]
-    fn diagonal<V: Registers>(&self, i: usize, out: &mut [f64]) {
-        let (mut top, mut low) = ([V::Four::splat(0.0); 4], [V::Eight::splat(0.0); 4]);
-        for twice in [0..self.own.start, self.own.end..self.p.len() / self.l] {
-            for (p, m) in self.rows(twice) {
-                let (p, m) = (&p[i..i + 8], &m[i..i + 8]);
-                (top, low) = (add(p, m, top), add(&p[4..], m, low));
-                (top, low) = (add(m, p, top), add(&m[4..], p, low));
-            }
+    fn diagonal<V: Registers>(&self, panel: usize) -> ([V::Four; TILE], [V::Eight; TILE]) {
+        let (p, m) = self.panel(panel);
+        let (mut top, mut bottom) = ([V::Four::splat(0.0); TILE], [V::Eight::splat(0.0); TILE]);
+        for (p, m) in p.iter().zip(m).take(self.once) {
+            (top, bottom) = (add(low(p), low(m), top), add(high(p), m, bottom));
         }
-        for (p, m) in self.rows(self.own.clone()) {
-            let (p, m) = (&p[i..i + 8], &m[i..i + 8]);
-            (top, low) = (add(p, m, top), add(&p[4..], m, low));
+        for (p, m) in p.iter().zip(m).skip(self.once) {
+            (top, bottom) = (add(low(p), low(m), top), add(high(p), m, bottom));
+            (top, bottom) = (add(low(m), low(p), top), add(high(m), p, bottom));
         }
-        store(top, i, i, out);
-        store(low, i + 4, i, out);
+        (top, bottom)
     }
 }
 
-/// Writes R rows from row i, W columns from column j.
-#[inline(always)]
-fn store<P: Pack<W>, const R: usize, const W: usize>(sum: [P; R], i: usize, j: usize, out: &mut [f64]) {
-    for r in 0..R {
-        if let Some(out) = out[triangle::row(i + r) + j..].first_chunk_mut() {
-            sum[r].store(out);
-        }
-    }
+fn low(row: &Row) -> &[f64; TILE] {
+    &row.as_chunks().0[0]
+}
+
+fn high(row: &Row) -> &[f64; TILE] {
+    &row.as_chunks().0[1]
 }
 
 /// sum + leftᵀ right.
 #[inline(always)]
-fn add<P: Pack<W>, const R: usize, const W: usize>(left: &[f64], right: &[f64], mut sum: [P; R]) -> [P; R] {
-    if let (Some(left), Some(right)) = (left.first_chunk::<R>(), right.first_chunk::<W>()) {
-        let right = P::load(right);
-        for r in 0..R {
-            sum[r] = P::splat(left[r]).mul_add(right, sum[r]);
-        }
+fn add<P: Pack<W>, const R: usize, const W: usize>(left: &[f64; R], right: &[f64; W], mut sum: [P; R]) -> [P; R] {
+    let right = P::load(right);
+    for r in 0..R {
+        sum[r] = P::splat(left[r]).mul_add(right, sum[r]);
     }
     sum
+}
+
+type Tile = [[f64; TILE]; TILE];
+
+/// Writes tile (I, J); one on the diagonal as the mean of itself and its transpose, symmetric to the bit.
+#[inline(always)]
+fn put<V: Registers>(mut tile: [V::Four; TILE], i: usize, j: usize, out: &mut [Tile]) {
+    if i == j {
+        let transpose = V::transpose(tile);
+        tile = std::array::from_fn(|r| V::Four::splat(0.5).mul(tile[r].add(transpose[r])));
+    }
+    let out = &mut out[triangle::number(i, j)];
+    for r in 0..TILE {
+        tile[r].store(&mut out[r]);
+    }
+}
+
+/// Writes the two tiles of row I in panel `j`.
+#[inline(always)]
+fn put_wide<V: Registers>(rows: [V::Eight; TILE], i: usize, j: usize, out: &mut [Tile]) {
+    let halves = rows.map(V::halves);
+    put::<V>(halves.map(|[left, _]| left), i, 2 * j, out);
+    put::<V>(halves.map(|[_, right]| right), i, 2 * j + 1, out);
 }
 
 fused! {

@@ -26,6 +26,8 @@ pub(super) trait Registers {
     const ROWS: usize;
     /// Rows as columns.
     fn transpose(rows: [Self::Four; 4]) -> [Self::Four; 4];
+    /// The first four of eight, and the others.
+    fn halves(eight: Self::Eight) -> [Self::Four; 2];
 }
 
 /// Arrays, for every processor.
@@ -69,6 +71,10 @@ impl Registers for Plain {
     #[inline(always)]
     fn transpose(rows: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
         std::array::from_fn(|c| std::array::from_fn(|r| rows[r][c]))
+    }
+    #[inline(always)]
+    fn halves(eight: [f64; 8]) -> [[f64; 4]; 2] {
+        std::array::from_fn(|h| std::array::from_fn(|c| eight[4 * h + c]))
     }
 }
 
@@ -212,6 +218,10 @@ mod x86 {
         fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
             transpose(rows)
         }
+        #[inline(always)]
+        fn halves(eight: [__m256d; 2]) -> [__m256d; 2] {
+            eight
+        }
     }
 
     impl Registers for Wide512 {
@@ -221,6 +231,11 @@ mod x86 {
         #[inline(always)]
         fn transpose(rows: [__m256d; 4]) -> [__m256d; 4] {
             transpose(rows)
+        }
+        #[inline(always)]
+        fn halves(eight: __m512d) -> [__m256d; 2] {
+            // SAFETY: the caller is compiled for this width; registers alone.
+            unsafe { [_mm512_castpd512_pd256(eight), _mm512_extractf64x4_pd::<1>(eight)] }
         }
     }
 }

@@ -1,8 +1,9 @@
 //! The lower triangle of a symmetric matrix by tiles of 4 × 4: what the integrator carries for a large game.
 //!
-//! Row i holds its first 4 (⌊i/4⌋ + 1) entries and the rows lie one after the other, so a tile on the diagonal is stored
-//! whole and one below it once. All that is done entry by entry then costs half; only products want the whole matrix.
-//! Rows and columns past N are zeros.
+//! Tile (I, J), J ≤ I, holds the entries (4I…4I+3, 4J…4J+3), row by row, and the tiles of a row of tiles lie one after the
+//! other: a tile on the diagonal is stored whole and one below it once. All that is done entry by entry then costs half;
+//! only products want the whole matrix, and want it in *panels* of eight columns, row after row. Rows and columns past
+//! N are zeros.
 //!
 //! Source: ours, by measurement.
 
@@ -10,6 +11,8 @@ use super::register::{Pack, Registers, fused};
 
 /// Rows and columns of a tile.
 pub(super) const TILE: usize = 4;
+/// Columns of a panel.
+pub(super) const PANEL: usize = 8;
 
 /// Tiles along a side of an N × N matrix.
 pub(super) fn tiles(n: usize) -> usize {
@@ -18,99 +21,90 @@ pub(super) fn tiles(n: usize) -> usize {
 
 /// Entries of the triangle of a matrix with so many tiles along a side: a multiple of 16.
 pub(super) fn len(tiles: usize) -> usize {
-    TILE * TILE * tiles * (tiles + 1) / 2
+    TILE * TILE * number(tiles, 0)
 }
 
-/// Where row i begins.
+/// The number of tile (I, J) in the triangle.
 #[inline(always)]
-pub(super) fn row(i: usize) -> usize {
-    let above = i / TILE;
-    len(above) + (i % TILE) * TILE * (above + 1)
+pub(super) fn number(i: usize, j: usize) -> usize {
+    i * (i + 1) / 2 + j
 }
 
-/// Writes the whole matrix in rows of 4 · `tiles` entries.
+/// Where entry (i, j) lies, for i ≥ j or both in one tile.
+pub(super) fn entry(i: usize, j: usize) -> usize {
+    TILE * TILE * number(i / TILE, j / TILE) + i % TILE * TILE + j % TILE
+}
+
+/// Writes the whole matrix in panels of `height` rows, a multiple of four.
 #[inline(always)]
-pub(super) fn expand<V: Registers>(tiles: usize, triangle: &[f64], whole: &mut [f64]) {
-    let mut triangle = triangle.as_chunks::<TILE>().0;
-    let whole = whole.as_chunks_mut::<TILE>().0;
+pub(super) fn expand<V: Registers>(tiles: usize, height: usize, triangle: &[f64], panels: &mut [f64]) {
+    let panels = panels.as_chunks_mut::<TILE>().0.as_chunks_mut::<PANEL>().0;
+    let mut rest = triangle.as_chunks::<TILE>().0.as_chunks::<TILE>().0.iter();
+    let height = height / TILE;
     for i in 0..tiles {
-        let (rows, rest) = triangle.split_at(TILE * (i + 1));
-        triangle = rest;
-        let (above, own) = whole.split_at_mut(TILE * i * tiles);
-        let own = &mut own[..TILE * tiles];
-        let tile = |j: usize| -> [V::Four; TILE] { std::array::from_fn(|r| V::Four::load(&rows[r * (i + 1) + j])) };
-        for (j, above) in above.chunks_exact_mut(TILE * tiles).enumerate() {
-            let tile = tile(j);
-            for r in 0..TILE {
-                tile[r].store(&mut own[r * tiles + j]);
+        for (j, tile) in rest.by_ref().take(i + 1).enumerate() {
+            let tile = tile.each_ref().map(V::Four::load);
+            put::<V>(tile, &mut panels[j / 2 * height + i], j % 2);
+            if j < i {
+                put::<V>(V::transpose(tile), &mut panels[i / 2 * height + j], i % 2);
             }
-            let columns = V::transpose(tile);
-            for c in 0..TILE {
-                columns[c].store(&mut above[c * tiles + i]);
-            }
-        }
-        let tile = tile(i);
-        for r in 0..TILE {
-            tile[r].store(&mut own[r * tiles + i]);
         }
     }
 }
 
-/// Makes the tiles on the diagonal symmetric to the bit, by what lies below it.
+/// Writes a tile into the left or the right half of four rows of a panel.
 #[inline(always)]
-pub(super) fn mirror_diagonal(tiles: usize, triangle: &mut [f64]) {
-    for i in 0..tiles {
-        let (at, stride) = (len(i) + TILE * i, TILE * (i + 1));
-        for r in 0..TILE {
-            for c in 0..r {
-                triangle[at + c * stride + r] = triangle[at + r * stride + c];
-            }
-        }
+fn put<V: Registers>(tile: [V::Four; TILE], rows: &mut [[f64; TILE]; PANEL], half: usize) {
+    for r in 0..TILE {
+        tile[r].store(&mut rows[2 * r + half]);
     }
 }
 
 fused! {
-    /// Writes the N × N matrix, N ≥ 3. `whole` is work space.
-    pub(super) fn unpack<V>(n: usize, triangle: &[f64], whole: &mut Vec<f64>, out: &mut [f64]) {
-        let (tiles, stride) = (tiles(n), n.next_multiple_of(TILE));
-        whole.resize(stride * stride, 0.0);
-        expand::<V>(tiles, triangle, whole);
-        let (rows, last) = whole.split_at((n - 1) * stride);
-        for (i, row) in rows.chunks_exact(stride).enumerate() {
-            // In whole registers: what goes over the end of the row is overwritten by the next.
-            let out = out[i * n..][..stride].as_chunks_mut::<TILE>().0;
-            for (to, from) in out.iter_mut().zip(row.as_chunks::<TILE>().0) {
-                V::Four::load(from).store(to);
+    /// Writes the N × N matrix. `panels` is work space.
+    pub(super) fn unpack<V>(n: usize, triangle: &[f64], panels: &mut Vec<f64>, out: &mut [f64]) {
+        let (tiles, height) = (tiles(n), n.next_multiple_of(TILE));
+        panels.resize(tiles.div_ceil(2) * height * PANEL, 0.0);
+        expand::<V>(tiles, height, triangle, panels);
+        for (s, panel) in panels.as_chunks::<PANEL>().0.chunks_exact(height).enumerate() {
+            for (row, out) in panel.iter().zip(out.chunks_exact_mut(n)) {
+                let out = &mut out[s * PANEL..];
+                if let Some(out) = out.first_chunk_mut() {
+                    V::Eight::load(row).store(out);
+                } else {
+                    for (out, x) in out.iter_mut().zip(row) {
+                        *out = *x;
+                    }
+                }
             }
         }
-        out[(n - 1) * n..].copy_from_slice(&last[..n]);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::register::Plain;
     use super::*;
     use crate::width::Width;
 
-    /// There and back: entry (i, j) of the whole is entry (max, min) of the triangle.
+    /// Entry (i, j) of the matrix is entry (max, min) of the triangle, for every width.
     #[test]
     fn the_whole_is_symmetric() {
-        for n in 3..=13 {
-            let (tiles, stride) = (tiles(n), n.next_multiple_of(TILE));
-            let mut triangle: Vec<f64> = (0..len(tiles)).map(|i| i as f64).collect();
-            mirror_diagonal(tiles, &mut triangle);
-            let mut whole = vec![f64::NAN; stride * stride];
-            expand::<Plain>(tiles, &triangle, &mut whole);
-            for i in 0..stride {
-                for j in 0..stride {
-                    assert_eq!(whole[i * stride + j], triangle[row(i.max(j)) + i.min(j)], "{n}: {i}, {j}");
+        for n in 1..=19 {
+            let mut triangle: Vec<f64> = (0..len(tiles(n))).map(|i| i as f64).collect();
+            for i in 0..n {
+                for j in 0..i {
+                    if j / TILE == i / TILE {
+                        triangle[entry(j, i)] = triangle[entry(i, j)];
+                    }
                 }
             }
-            let mut out = vec![0.0; n * n];
-            unpack(Width::detect(), n, &triangle, &mut Vec::new(), &mut out);
-            for (ij, x) in out.into_iter().enumerate() {
-                assert_eq!(x, whole[ij / n * stride + ij % n]);
+            for width in Width::all() {
+                let mut out = vec![f64::NAN; n * n];
+                unpack(width, n, &triangle, &mut Vec::new(), &mut out);
+                for (ij, x) in out.into_iter().enumerate() {
+                    let (i, j) = (ij / n, ij % n);
+                    assert_eq!(x, triangle[entry(i.max(j), i.min(j))], "{n}: {i}, {j}");
+                }
             }
         }
     }

@@ -40,25 +40,33 @@ pub(super) fn whole(y: &[f64], stride: usize, sizes: &mut [f64], out: &mut [f64]
 
 /// Weights of a [`triangle`]: an entry that stands for two counts twice.
 pub(super) fn triangle(y: &[f64], tiles: usize, sizes: &mut [f64], out: &mut [f64]) {
-    let rows = TILE * tiles;
-    sizes[..rows].fill(0.0);
-    for i in 0..rows {
-        let row = &y[triangle::row(i)..][..TILE * (i / TILE + 1)];
-        let mut largest = [0.0_f64; TILE];
-        for (x, sizes) in row.as_chunks::<TILE>().0.iter().zip(sizes.as_chunks_mut::<TILE>().0) {
-            for c in 0..TILE {
-                sizes[c] = larger(sizes[c], x[c]);
-                largest[c] = larger(largest[c], x[c]);
+    let sizes = &mut sizes[..TILE * tiles];
+    sizes.fill(0.0);
+    let mut rest = y.as_chunks::<TILE>().0.as_chunks::<TILE>().0.iter();
+    for i in 0..tiles {
+        let mut largest = [[0.0_f64; TILE]; TILE];
+        for (tile, sizes) in rest.by_ref().take(i + 1).zip(sizes.as_chunks_mut::<TILE>().0) {
+            for r in 0..TILE {
+                for c in 0..TILE {
+                    sizes[c] = larger(sizes[c], tile[r][c]);
+                    largest[r][c] = larger(largest[r][c], tile[r][c]);
+                }
             }
         }
-        sizes[i] = largest.into_iter().fold(sizes[i], larger);
+        for r in 0..TILE {
+            sizes[TILE * i + r] = largest[r].into_iter().fold(sizes[TILE * i + r], larger);
+        }
     }
-    invert(&mut sizes[..rows]);
-    for i in 0..rows {
-        let below = TILE * (i / TILE);
-        let row = &mut out[triangle::row(i)..][..below + TILE];
-        for (j, w) in row.iter_mut().enumerate() {
-            *w = sizes[i] * sizes[j] * if j < below { std::f64::consts::SQRT_2 } else { 1.0 };
+    invert(sizes);
+    let mut rest = out.as_chunks_mut::<TILE>().0.as_chunks_mut::<TILE>().0.iter_mut();
+    let sizes = sizes.as_chunks::<TILE>().0;
+    for i in 0..tiles {
+        for (j, tile) in rest.by_ref().take(i + 1).enumerate() {
+            let twice = if j < i { std::f64::consts::SQRT_2 } else { 1.0 };
+            for r in 0..TILE {
+                let row = twice * sizes[i][r];
+                tile[r] = sizes[j].map(|column| row * column);
+            }
         }
     }
 }
@@ -82,10 +90,17 @@ mod tests {
     fn a_triangle_weighs_as_much_as_the_whole() {
         for tiles in 1..=3 {
             let stride = TILE * tiles;
-            let mut y: Vec<f64> = (0..triangle::len(tiles)).map(|i| 40.0 * (0.7 + i as f64).sin()).collect();
-            triangle::mirror_diagonal(tiles, &mut y);
+            let mut y = vec![0.0; triangle::len(tiles)];
             let mut full = vec![0.0; stride * stride];
-            triangle::expand::<super::super::register::Plain>(tiles, &y, &mut full);
+            for i in 0..stride {
+                for j in 0..=i {
+                    let x = 40.0 * (0.7 + (i * i + j) as f64).sin();
+                    (full[i * stride + j], full[j * stride + i], y[triangle::entry(i, j)]) = (x, x, x);
+                    if i / TILE == j / TILE {
+                        y[triangle::entry(j, i)] = x;
+                    }
+                }
+            }
             let (mut sizes, mut w, mut w_full) = (vec![0.0; stride], vec![0.0; y.len()], vec![0.0; full.len()]);
             triangle(&y, tiles, &mut sizes, &mut w);
             whole(&full, stride, &mut sizes, &mut w_full);
