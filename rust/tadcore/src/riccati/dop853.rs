@@ -195,11 +195,10 @@ pub(super) fn integrate(
                     next += 1;
                     continue;
                 }
-                // Those that a step holds besides are computed with the first; past the step they are not looked at.
+                // The nodes that follow are computed with this one, and used if they lie in this step, too.
                 let theta: [f64; TOGETHER] = std::array::from_fn(|i| ((node(next + i) - s) - low) / h);
-                let inside =
-                    (1..TOGETHER).filter(|i| next + i < steps + usize::from(!last) && node(next + i) <= reached);
-                let count = 1 + inside.count();
+                let end = if last { steps } else { steps + 1 };
+                let count = 1 + (next + 1..end).take(TOGETHER - 1).take_while(|&j| node(j) <= reached).count();
                 if count == 1 {
                     lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, [theta[0]]);
                 } else {

@@ -6,7 +6,7 @@
 //!
 //! Source: ours, by measurement.
 
-use super::triangle::{self, TILE};
+use super::triangle::TILE;
 
 /// Rows smaller than this part of the largest row are weighed as if they were not.
 const FLOOR: f64 = 1e-3;
@@ -38,7 +38,7 @@ pub(super) fn whole(y: &[f64], stride: usize, sizes: &mut [f64], out: &mut [f64]
     }
 }
 
-/// Weights of a [`triangle`]: an entry that stands for two counts twice.
+/// Weights of a [triangle](super::triangle): an entry that stands for two counts twice.
 pub(super) fn triangle(y: &[f64], tiles: usize, sizes: &mut [f64], out: &mut [f64]) {
     let sizes = &mut sizes[..TILE * tiles];
     sizes.fill(0.0);
@@ -73,6 +73,7 @@ pub(super) fn triangle(y: &[f64], tiles: usize, sizes: &mut [f64], out: &mut [f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::triangle;
     use super::*;
 
     /// Entry (i, j) is divided by m_i m_j, m_i² being the largest entry of row i, but at least a thousandth of all.
