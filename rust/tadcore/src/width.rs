@@ -1,14 +1,14 @@
 //! How wide the processor's vectors are: hot loops are compiled for each width, and the processor decides at run time.
 //!
-//! Only the width differs: the operations and their order are the same and none is fused, so every width gives the
-//! same bits.
+//! Only the width differs: the operations and their order are the same, so every width gives the same bits. In
+//! `widened!` no operation is fused with another.
 
 /// Which instructions the processor has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Width {
     /// Whatever the target guarantees.
     Baseline,
-    /// 256 bits; only made by [`Width::detect`] after asking the processor.
+    /// 256 bits and fused operations; only made by [`Width::detect`] after asking the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
     /// 512 bits (AVX-512F and VL), and all of the above; only made by [`Width::detect`].
@@ -26,7 +26,7 @@ impl Width {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = vec![Self::Baseline];
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
             all.push(Self::Avx2);
             if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
                 all.push(Self::Avx512);

@@ -21,21 +21,30 @@
 //!
 //! | room | what it knows |
 //! |---|---|
-//! | `coupled` | I1: the right-hand side in three products |
+//! | `coupled`, `large` | I1: the right-hand side for N known to the compiler, and for any N |
+//! | `triangle` | how the matrices of a large game are stored |
 //! | `dop853`, `lanes`, `tableau` | the adaptive integrator of order 8, its loops, its coefficients |
+//! | `weight` | the norm of its error |
 //! | `hamiltonian` | I2: exact steps that cannot jump over a pole |
 //! | `escape` | what counts as an escape, and when it happens |
 //! | `residual` | how well a stored solution satisfies the equations as printed |
 //!
 //! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node.
 
+mod aligned;
 mod coupled;
 mod dop853;
 mod escape;
 mod hamiltonian;
 mod lanes;
+mod large;
+mod register;
 mod residual;
 mod tableau;
+mod triangle;
+mod weight;
+
+use std::alloc::{Layout, alloc_zeroed};
 
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
@@ -62,18 +71,34 @@ pub struct Equilibrium {
 pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, EquilibriumError> {
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
     let numbers = (steps + 1) * groups(interaction) * size * size;
-    let mut nodes = Vec::new();
-    // A refusal, where a plain allocation would end the process.
-    nodes.try_reserve_exact(numbers).map_err(|_| EquilibriumError::Memory { bytes: numbers * size_of::<f64>() })?;
-    nodes.resize(numbers, 0.0);
+    let mut nodes = zeros(numbers)?;
     let integrator_steps = match interaction {
         Interaction::I1 => coupled::solve(game, cancel, &mut nodes)?,
         Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,
     };
-    if !nodes.iter().all(|p| p.is_finite()) {
+    if interaction == Interaction::I2 && !finite(&nodes) {
         return Err(EquilibriumError::Range);
     }
     Ok(Equilibrium { interaction, size, steps, integrator_steps, nodes })
+}
+
+/// Memory that the system hands out zeroed, or a refusal where a plain allocation would end the process.
+fn zeros(numbers: usize) -> Result<Vec<f64>, EquilibriumError> {
+    let refused = || EquilibriumError::Memory { bytes: numbers.saturating_mul(size_of::<f64>()) };
+    let layout = Layout::array::<f64>(numbers).map_err(|_| refused())?;
+    // SAFETY: the layout is not empty, since every grid has a node and every node a matrix.
+    let start = unsafe { alloc_zeroed(layout) }.cast::<f64>();
+    if start.is_null() {
+        return Err(refused());
+    }
+    // SAFETY: the memory is the global allocator's, for an array of so many numbers, all of them 0.0.
+    Ok(unsafe { Vec::from_raw_parts(start, numbers, numbers) })
+}
+
+/// Whether all numbers are.
+fn finite(numbers: &[f64]) -> bool {
+    // In chunks that are looked at whole, so that the loop over one needs no branch.
+    numbers.chunks(256).all(|chunk| chunk.iter().fold(true, |fine, x| fine & x.is_finite()))
 }
 
 fn groups(interaction: Interaction) -> usize {

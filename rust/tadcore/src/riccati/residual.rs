@@ -21,6 +21,7 @@
 use super::Equilibrium;
 use super::dop853::{self, Flow};
 use super::lanes::LANES;
+use super::weight;
 use crate::cancel::CancelToken;
 use crate::game::{Game, Interaction};
 
@@ -123,9 +124,6 @@ impl Flow for Textbook {
     fn block_len(&self) -> usize {
         self.block
     }
-    fn shape(&self) -> (usize, usize) {
-        (self.n, self.n)
-    }
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
         let len = self.n * self.n;
         let p: Vec<&[f64]> = y.chunks_exact(self.block).map(|b| &b[..len]).collect();
@@ -137,6 +135,10 @@ impl Flow for Textbook {
                 }
             }
         }
+    }
+    fn weigh(&mut self, y: &[f64], out: &mut [f64]) {
+        let len = self.n * self.n;
+        weight::whole(&y[..len], self.n, &mut vec![0.0; self.n], &mut out[..len]);
     }
 }
 
