@@ -1,0 +1,303 @@
+//! Numbers side by side: one, or eight in the registers of a [`Width`](crate::width::Width).
+//!
+//! What is written once over [`Number`] runs for one problem or for eight at a time. Every operation is the plain IEEE
+//! one on each lane and none is fused with another, so a lane gives the bits that the number alone would give, on every
+//! width. The methods of the wide types are inlined into functions that are compiled for their instructions; a closure
+//! is a function of its own and is not, so kernels over `Number` are plain loops.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Eight256, Eight512};
+
+/// One number, or several side by side.
+pub(crate) trait Number:
+    Copy + std::fmt::Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// How many, at most eight.
+    const LANES: usize;
+    /// A yes or no for each lane.
+    type Mask: Copy + std::fmt::Debug;
+
+    /// The same number in all lanes.
+    fn splat(x: f64) -> Self;
+    /// The number in one lane.
+    fn lane(&self, lane: usize) -> f64;
+    /// Replaces the number in one lane.
+    fn set_lane(&mut self, lane: usize, x: f64);
+    fn sqrt(self) -> Self;
+    fn abs(self) -> Self;
+    /// Where a < b; no where one is no number.
+    fn less(self, other: Self) -> Self::Mask;
+    /// Where a ≤ b; no where one is no number.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask says so, elsewhere `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// A mask from its bits, lane 0 the lowest.
+    fn mask(bits: u8) -> Self::Mask;
+    /// A mask as bits.
+    fn bits(mask: Self::Mask) -> u8;
+    /// The numbers as they are, where there is one lane.
+    fn alone(_numbers: &mut [Self]) -> Option<&mut [f64]> {
+        None
+    }
+
+    /// The larger one; the first where one is no number.
+    #[inline(always)]
+    fn or_larger(self, other: Self) -> Self {
+        Self::select(self.less(other), other, self)
+    }
+}
+
+/// √Σx², summed in order.
+#[inline(always)]
+pub(crate) fn norm<T: Number>(numbers: &[T]) -> T {
+    sum_of_squares(numbers).sqrt()
+}
+
+/// Σx², summed in order.
+#[inline(always)]
+pub(crate) fn sum_of_squares<T: Number>(numbers: &[T]) -> T {
+    let mut sum = T::splat(0.0);
+    for &x in numbers {
+        sum = sum + x * x;
+    }
+    sum
+}
+
+/// Σxy, summed in order.
+#[inline(always)]
+pub(crate) fn dot<T: Number>(a: &[T], b: &[T]) -> T {
+    let mut sum = T::splat(0.0);
+    for (&a, &b) in a.iter().zip(b) {
+        sum = sum + a * b;
+    }
+    sum
+}
+
+impl Number for f64 {
+    const LANES: usize = 1;
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(x: f64) -> f64 {
+        x
+    }
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> f64 {
+        *self
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _lane: usize, x: f64) {
+        *self = x;
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> f64 {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn less(self, other: f64) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn at_most(self, other: f64) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: f64, no: f64) -> f64 {
+        if mask { yes } else { no }
+    }
+    #[inline(always)]
+    fn mask(bits: u8) -> bool {
+        bits & 1 == 1
+    }
+    #[inline(always)]
+    fn bits(mask: bool) -> u8 {
+        u8::from(mask)
+    }
+    #[inline(always)]
+    fn alone(numbers: &mut [f64]) -> Option<&mut [f64]> {
+        Some(numbers)
+    }
+}
+
+/// The registers of x86-64 processors.
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::*;
+    use std::ops::{Add, Div, Mul, Sub};
+
+    use super::Number;
+
+    /// AVX2: two registers.
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Eight256([__m256d; 2]);
+
+    /// AVX-512F: one register.
+    #[derive(Debug, Clone, Copy)]
+    pub(crate) struct Eight512(__m512d);
+
+    macro_rules! operators {
+        ($($trait:ident $name:ident $two:ident $one:ident),*) => {$(
+            impl $trait for Eight256 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX2; registers alone.
+                    unsafe { Self([$two(self.0[0], other.0[0]), $two(self.0[1], other.0[1])]) }
+                }
+            }
+            impl $trait for Eight512 {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512F; registers alone.
+                    unsafe { Self($one(self.0, other.0)) }
+                }
+            }
+        )*};
+    }
+
+    operators!(
+        Add add _mm256_add_pd _mm512_add_pd,
+        Sub sub _mm256_sub_pd _mm512_sub_pd,
+        Mul mul _mm256_mul_pd _mm512_mul_pd,
+        Div div _mm256_div_pd _mm512_div_pd
+    );
+
+    impl Number for Eight256 {
+        const LANES: usize = 8;
+        type Mask = [__m256d; 2];
+
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe { Self([_mm256_set1_pd(x); 2]) }
+        }
+        #[inline(always)]
+        fn lane(&self, lane: usize) -> f64 {
+            let mut out = [0.0; 8];
+            // SAFETY: the caller is compiled for AVX2; writes the 8 numbers of `out`.
+            unsafe {
+                _mm256_storeu_pd(out.as_mut_ptr(), self.0[0]);
+                _mm256_storeu_pd(out.as_mut_ptr().add(4), self.0[1]);
+            }
+            out[lane]
+        }
+        #[inline(always)]
+        fn set_lane(&mut self, lane: usize, x: f64) {
+            *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe { Self([_mm256_sqrt_pd(self.0[0]), _mm256_sqrt_pd(self.0[1])]) }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe {
+                let sign = _mm256_set1_pd(-0.0);
+                Self([_mm256_andnot_pd(sign, self.0[0]), _mm256_andnot_pd(sign, self.0[1])])
+            }
+        }
+        #[inline(always)]
+        fn less(self, other: Self) -> [__m256d; 2] {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe {
+                [_mm256_cmp_pd::<_CMP_LT_OQ>(self.0[0], other.0[0]), _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[1], other.0[1])]
+            }
+        }
+        #[inline(always)]
+        fn at_most(self, other: Self) -> [__m256d; 2] {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe {
+                [_mm256_cmp_pd::<_CMP_LE_OQ>(self.0[0], other.0[0]), _mm256_cmp_pd::<_CMP_LE_OQ>(self.0[1], other.0[1])]
+            }
+        }
+        #[inline(always)]
+        fn select(mask: [__m256d; 2], yes: Self, no: Self) -> Self {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe {
+                Self([_mm256_blendv_pd(no.0[0], yes.0[0], mask[0]), _mm256_blendv_pd(no.0[1], yes.0[1], mask[1])])
+            }
+        }
+        #[inline(always)]
+        fn mask(bits: u8) -> [__m256d; 2] {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe {
+                let bits = _mm256_set1_epi64x(i64::from(bits));
+                let (low, high) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_setr_epi64x(16, 32, 64, 128));
+                [
+                    _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, low), low)),
+                    _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, high), high)),
+                ]
+            }
+        }
+        #[inline(always)]
+        fn bits(mask: [__m256d; 2]) -> u8 {
+            // SAFETY: the caller is compiled for AVX2; registers alone.
+            unsafe { (_mm256_movemask_pd(mask[0]) | _mm256_movemask_pd(mask[1]) << 4) as u8 }
+        }
+    }
+
+    impl Number for Eight512 {
+        const LANES: usize = 8;
+        type Mask = __mmask8;
+
+        #[inline(always)]
+        fn splat(x: f64) -> Self {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { Self(_mm512_set1_pd(x)) }
+        }
+        #[inline(always)]
+        fn lane(&self, lane: usize) -> f64 {
+            let mut out = [0.0; 8];
+            // SAFETY: the caller is compiled for AVX-512F; writes the 8 numbers of `out`.
+            unsafe { _mm512_storeu_pd(out.as_mut_ptr(), self.0) };
+            out[lane]
+        }
+        #[inline(always)]
+        fn set_lane(&mut self, lane: usize, x: f64) {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { self.0 = _mm512_mask_mov_pd(self.0, 1 << lane, _mm512_set1_pd(x)) };
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { Self(_mm512_abs_pd(self.0)) }
+        }
+        #[inline(always)]
+        fn less(self, other: Self) -> __mmask8 {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn at_most(self, other: Self) -> __mmask8 {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
+            // SAFETY: the caller is compiled for AVX-512F; registers alone.
+            unsafe { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
+        }
+        #[inline(always)]
+        fn mask(bits: u8) -> __mmask8 {
+            bits
+        }
+        #[inline(always)]
+        fn bits(mask: __mmask8) -> u8 {
+            mask
+        }
+    }
+}
