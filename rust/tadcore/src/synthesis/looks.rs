@@ -48,6 +48,8 @@ const ROUNDS: usize = 4;
 /// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
 /// of them mean a narrow valley, whose floor is worth following to its end.
 const QUICK: usize = 30;
+/// Iterations, at most, after the tolerance is met in such a valley.
+const POLISH: usize = 50;
 /// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as
 /// small makes no other points of A + B and A − B.
 const BACK: f64 = 1e-3;
@@ -129,12 +131,17 @@ impl Search<'_> {
             entry.quick = entry.iterations <= QUICK;
         }
         let open: Vec<usize> = (0..entries.len()).filter(|&e| !entries[e].certified).collect();
-        if open.is_empty() {
-            return;
+        if !open.is_empty() {
+            self.look_further::<N>(entries, &open);
         }
-        let looks = self.double::<N>(entries, &open);
+        self.polish::<N>(entries);
+    }
+
+    /// Everything beyond the first descent, for the entries `open`.
+    fn look_further<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) {
+        let looks = self.double::<N>(entries, open);
         self.finish::<N>(entries, &looks);
-        let mut lower = open.clone();
+        let mut lower = open.to_vec();
         for _ in 0..ROUNDS {
             self.start(1);
             for &e in &lower {
@@ -147,8 +154,31 @@ impl Search<'_> {
             }
         }
         // Where a later look won there is another point to be tried for the certificate.
-        let won: Vec<usize> = open.into_iter().filter(|&e| entries[e].look != Look::Canonical).collect();
+        let won: Vec<usize> = open.iter().copied().filter(|&e| entries[e].look != Look::Canonical).collect();
         self.certify::<N>(entries, &won);
+    }
+
+    /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
+    /// long as the gradient falls.
+    fn polish<const N: usize>(&mut self, entries: &mut [Entry]) {
+        self.start(1);
+        for (e, entry) in entries.iter().enumerate().filter(|(_, entry)| !entry.quick) {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&entry.g);
+        }
+        if self.tasks.len() == 0 {
+            return;
+        }
+        let limits = self.limits;
+        self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
+        self.descend::<N>(Kind::Real, entries);
+        self.limits = limits;
+        for task in 0..self.tasks.len() {
+            let (entry, reached) = (&mut entries[self.tasks.owner(task)], self.tasks.reached(task));
+            entry.iterations += reached.iterations;
+            if reached.gradient_norm < entry.reached.gradient_norm {
+                entry.take(entry.look, self.tasks.point(task), reached);
+            }
+        }
     }
 
     /// Empties the list for points of as many copies of the gains.
@@ -234,6 +264,9 @@ impl Search<'_> {
 
     /// Tries the certificate at the best point of each of `which`.
     pub(super) fn certify<const N: usize>(&mut self, entries: &mut [Entry], which: &[usize]) {
+        if which.is_empty() {
+            return;
+        }
         self.start(1);
         for &e in which {
             self.tasks.add(e, false, 0.0).copy_from_slice(&entries[e].g);
