@@ -1,14 +1,13 @@
-//! Numbers side by side: one, or eight in the registers of a [`Width`](crate::width::Width).
+//! Numbers side by side: one, or four in each vector register.
 //!
-//! What is written once over [`Number`] runs for one problem or for eight at a time. Every operation is the plain IEEE
-//! one on each lane and none is fused with another, so a lane gives the bits that the number alone would give, on every
-//! width. The methods of the wide types are inlined into functions that are compiled for their instructions; a closure
+//! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the plain IEEE
+//! one on each lane and none is fused with another, so a lane gives the bits that the number alone would give. The methods of the wide types are inlined into functions that are compiled for their instructions; a closure
 //! is a function of its own and is not, so kernels over `Number` are plain loops.
 
 use std::ops::{Add, Div, Mul, Sub};
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Eight256, Eight512};
+pub(crate) use x86::{Eight, Four, Wide};
 
 /// One number, or several side by side.
 pub(crate) trait Number:
@@ -133,171 +132,203 @@ mod x86 {
 
     use super::Number;
 
-    /// AVX2: two registers.
+    /// AVX2: four numbers in each of `R` registers.
     #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Eight256([__m256d; 2]);
-
-    /// AVX-512F: one register.
-    #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Eight512(__m512d);
+    pub(crate) struct Wide<const R: usize>([__m256d; R]);
 
     macro_rules! operators {
-        ($($trait:ident $name:ident $two:ident $one:ident),*) => {$(
-            impl $trait for Eight256 {
+        ($($trait:ident $name:ident $of:ident),*) => {$(
+            impl<const R: usize> $trait for Wide<R> {
                 type Output = Self;
                 #[inline(always)]
-                fn $name(self, other: Self) -> Self {
-                    // SAFETY: the caller is compiled for AVX2; registers alone.
-                    unsafe { Self([$two(self.0[0], other.0[0]), $two(self.0[1], other.0[1])]) }
-                }
-            }
-            impl $trait for Eight512 {
-                type Output = Self;
-                #[inline(always)]
-                fn $name(self, other: Self) -> Self {
-                    // SAFETY: the caller is compiled for AVX-512F; registers alone.
-                    unsafe { Self($one(self.0, other.0)) }
+                fn $name(mut self, other: Self) -> Self {
+                    for r in 0..R {
+                        // SAFETY: the caller is compiled for AVX2; registers alone.
+                        self.0[r] = unsafe { $of(self.0[r], other.0[r]) };
+                    }
+                    self
                 }
             }
         )*};
     }
 
-    operators!(
-        Add add _mm256_add_pd _mm512_add_pd,
-        Sub sub _mm256_sub_pd _mm512_sub_pd,
-        Mul mul _mm256_mul_pd _mm512_mul_pd,
-        Div div _mm256_div_pd _mm512_div_pd
-    );
+    operators!(Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
 
-    impl Number for Eight256 {
-        const LANES: usize = 8;
-        type Mask = [__m256d; 2];
+    impl<const R: usize> Number for Wide<R> {
+        const LANES: usize = 4 * R;
+        type Mask = [__m256d; R];
 
         #[inline(always)]
         fn splat(x: f64) -> Self {
             // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe { Self([_mm256_set1_pd(x); 2]) }
+            unsafe { Self([_mm256_set1_pd(x); R]) }
         }
         #[inline(always)]
         fn lane(&self, lane: usize) -> f64 {
-            let mut out = [0.0; 8];
-            // SAFETY: the caller is compiled for AVX2; writes the 8 numbers of `out`.
-            unsafe {
-                _mm256_storeu_pd(out.as_mut_ptr(), self.0[0]);
-                _mm256_storeu_pd(out.as_mut_ptr().add(4), self.0[1]);
-            }
-            out[lane]
+            let mut out = [0.0; 4];
+            // SAFETY: the caller is compiled for AVX2; writes the 4 numbers of `out`.
+            unsafe { _mm256_storeu_pd(out.as_mut_ptr(), self.0[lane / 4]) };
+            out[lane % 4]
         }
         #[inline(always)]
         fn set_lane(&mut self, lane: usize, x: f64) {
             *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
         }
         #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe { Self([_mm256_sqrt_pd(self.0[0]), _mm256_sqrt_pd(self.0[1])]) }
+        fn sqrt(mut self) -> Self {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                self.0[r] = unsafe { _mm256_sqrt_pd(self.0[r]) };
+            }
+            self
         }
         #[inline(always)]
-        fn abs(self) -> Self {
+        fn abs(mut self) -> Self {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                self.0[r] = unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0[r]) };
+            }
+            self
+        }
+        #[inline(always)]
+        fn less(mut self, other: Self) -> [__m256d; R] {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                self.0[r] = unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], other.0[r]) };
+            }
+            self.0
+        }
+        #[inline(always)]
+        fn at_most(mut self, other: Self) -> [__m256d; R] {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                self.0[r] = unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(self.0[r], other.0[r]) };
+            }
+            self.0
+        }
+        #[inline(always)]
+        fn select(mask: [__m256d; R], mut yes: Self, no: Self) -> Self {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                yes.0[r] = unsafe { _mm256_blendv_pd(no.0[r], yes.0[r], mask[r]) };
+            }
+            yes
+        }
+        #[inline(always)]
+        fn mask(bits: u8) -> [__m256d; R] {
             // SAFETY: the caller is compiled for AVX2; registers alone.
             unsafe {
-                let sign = _mm256_set1_pd(-0.0);
-                Self([_mm256_andnot_pd(sign, self.0[0]), _mm256_andnot_pd(sign, self.0[1])])
+                let mut mask = [_mm256_setzero_pd(); R];
+                for r in 0..R {
+                    let (own, bits) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_set1_epi64x(i64::from(bits >> (4 * r))));
+                    mask[r] = _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, own), own));
+                }
+                mask
             }
         }
         #[inline(always)]
-        fn less(self, other: Self) -> [__m256d; 2] {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe {
-                [_mm256_cmp_pd::<_CMP_LT_OQ>(self.0[0], other.0[0]), _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[1], other.0[1])]
+        fn bits(mask: [__m256d; R]) -> u8 {
+            let mut bits = 0;
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                bits |= unsafe { _mm256_movemask_pd(mask[r]) } << (4 * r);
             }
-        }
-        #[inline(always)]
-        fn at_most(self, other: Self) -> [__m256d; 2] {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe {
-                [_mm256_cmp_pd::<_CMP_LE_OQ>(self.0[0], other.0[0]), _mm256_cmp_pd::<_CMP_LE_OQ>(self.0[1], other.0[1])]
-            }
-        }
-        #[inline(always)]
-        fn select(mask: [__m256d; 2], yes: Self, no: Self) -> Self {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe {
-                Self([_mm256_blendv_pd(no.0[0], yes.0[0], mask[0]), _mm256_blendv_pd(no.0[1], yes.0[1], mask[1])])
-            }
-        }
-        #[inline(always)]
-        fn mask(bits: u8) -> [__m256d; 2] {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe {
-                let bits = _mm256_set1_epi64x(i64::from(bits));
-                let (low, high) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_setr_epi64x(16, 32, 64, 128));
-                [
-                    _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, low), low)),
-                    _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, high), high)),
-                ]
-            }
-        }
-        #[inline(always)]
-        fn bits(mask: [__m256d; 2]) -> u8 {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            unsafe { (_mm256_movemask_pd(mask[0]) | _mm256_movemask_pd(mask[1]) << 4) as u8 }
+            bits as u8
         }
     }
 
-    impl Number for Eight512 {
-        const LANES: usize = 8;
-        type Mask = __mmask8;
+    /// AVX-512: one register and its masks.
+    macro_rules! masked {
+        ($(#[$doc:meta])* $type:ident $register:ident $lanes:literal: $add:ident $sub:ident $mul:ident $div:ident
+         $sqrt:ident $abs:ident $set:ident $store:ident $compare:ident $blend:ident) => {
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy)]
+            pub(crate) struct $type($register);
 
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { Self(_mm512_set1_pd(x)) }
-        }
-        #[inline(always)]
-        fn lane(&self, lane: usize) -> f64 {
-            let mut out = [0.0; 8];
-            // SAFETY: the caller is compiled for AVX-512F; writes the 8 numbers of `out`.
-            unsafe { _mm512_storeu_pd(out.as_mut_ptr(), self.0) };
-            out[lane]
-        }
-        #[inline(always)]
-        fn set_lane(&mut self, lane: usize, x: f64) {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { self.0 = _mm512_mask_mov_pd(self.0, 1 << lane, _mm512_set1_pd(x)) };
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { Self(_mm512_sqrt_pd(self.0)) }
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { Self(_mm512_abs_pd(self.0)) }
-        }
-        #[inline(always)]
-        fn less(self, other: Self) -> __mmask8 {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) }
-        }
-        #[inline(always)]
-        fn at_most(self, other: Self) -> __mmask8 {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, other.0) }
-        }
-        #[inline(always)]
-        fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
-            // SAFETY: the caller is compiled for AVX-512F; registers alone.
-            unsafe { Self(_mm512_mask_blend_pd(mask, no.0, yes.0)) }
-        }
-        #[inline(always)]
-        fn mask(bits: u8) -> __mmask8 {
-            bits
-        }
-        #[inline(always)]
-        fn bits(mask: __mmask8) -> u8 {
-            mask
-        }
+            masked!(@operators $type: Add add $add, Sub sub $sub, Mul mul $mul, Div div $div);
+
+            impl Number for $type {
+                const LANES: usize = $lanes;
+                type Mask = __mmask8;
+
+                #[inline(always)]
+                fn splat(x: f64) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($set(x)) }
+                }
+                #[inline(always)]
+                fn lane(&self, lane: usize) -> f64 {
+                    let mut out = [0.0; $lanes];
+                    // SAFETY: the caller is compiled for AVX-512; writes all numbers of `out`.
+                    unsafe { $store(out.as_mut_ptr(), self.0) };
+                    out[lane]
+                }
+                #[inline(always)]
+                fn set_lane(&mut self, lane: usize, x: f64) {
+                    *self = Self::select(1 << lane, Self::splat(x), *self);
+                }
+                #[inline(always)]
+                fn sqrt(self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($sqrt(self.0)) }
+                }
+                #[inline(always)]
+                fn abs(self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($abs(self.0)) }
+                }
+                #[inline(always)]
+                fn less(self, other: Self) -> __mmask8 {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { $compare::<_CMP_LT_OQ>(self.0, other.0) }
+                }
+                #[inline(always)]
+                fn at_most(self, other: Self) -> __mmask8 {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { $compare::<_CMP_LE_OQ>(self.0, other.0) }
+                }
+                #[inline(always)]
+                fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($blend(mask, no.0, yes.0)) }
+                }
+                #[inline(always)]
+                fn mask(bits: u8) -> __mmask8 {
+                    bits
+                }
+                #[inline(always)]
+                fn bits(mask: __mmask8) -> u8 {
+                    mask
+                }
+            }
+        };
+        (@operators $type:ident: $($trait:ident $name:ident $of:ident),*) => {$(
+            impl $trait for $type {
+                type Output = Self;
+                #[inline(always)]
+                fn $name(self, other: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($of(self.0, other.0)) }
+                }
+            }
+        )*};
+    }
+
+    masked!(
+        /// AVX-512: eight numbers in a register.
+        Eight __m512d 8: _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
+        _mm512_sqrt_pd _mm512_abs_pd _mm512_set1_pd _mm512_storeu_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
+    );
+
+    masked!(
+        /// AVX-512VL: four numbers in half a register.
+        Four __m256d 4: _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
+        _mm256_sqrt_pd absolute _mm256_set1_pd _mm256_storeu_pd _mm256_cmp_pd_mask _mm256_mask_blend_pd
+    );
+
+    #[inline(always)]
+    unsafe fn absolute(x: __m256d) -> __m256d {
+        // SAFETY: the caller is compiled for AVX-512VL; registers alone.
+        unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), x) }
     }
 }

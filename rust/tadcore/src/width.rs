@@ -11,7 +11,7 @@ pub(crate) enum Width {
     /// 256 bits; only made by [`Width::detect`] after asking the processor.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// 512 bits, and all of the above; only made by [`Width::detect`].
+    /// 512 bits and masks at every width, and all of the above; only made by [`Width::detect`].
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
@@ -28,7 +28,7 @@ impl Width {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             all.push(Self::Avx2);
-            if std::arch::is_x86_feature_detected!("avx512f") {
+            if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
                 all.push(Self::Avx512);
             }
         }

@@ -1,7 +1,7 @@
-//! Runs a list of descents as wide as the processor and the list allow: one at a time, or eight side by side.
+//! Runs a list of descents as wide as the processor and the list allow: one at a time, or four or eight side by side.
 //!
-//! Each descent gives the same bits either way, so the choice is one of speed alone. Eight side by side cost what two
-//! cost one after the other; sizes above [`SIDE_BY_SIDE_UP_TO`] leave the first cache then, and go one at a time.
+//! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
+//! leave the first cache side by side, and go one at a time.
 
 use super::dense;
 use super::doubled::Doubled;
@@ -12,7 +12,7 @@ use super::start::Variable;
 use super::tasks::{Limits, Owner, Tasks};
 use crate::lanes::Number;
 #[cfg(target_arch = "x86_64")]
-use crate::lanes::{Eight256, Eight512};
+use crate::lanes::{Eight, Four, Wide};
 use crate::width::Width;
 
 /// N up to which there is a version with constant loop bounds.
@@ -41,9 +41,11 @@ pub(super) struct Engine {
     width: Width,
     one: Workspace<f64>,
     #[cfg(target_arch = "x86_64")]
-    eight256: Workspace<Eight256>,
+    wide: Workspace<Wide<1>>,
     #[cfg(target_arch = "x86_64")]
-    eight512: Workspace<Eight512>,
+    four: Workspace<Four>,
+    #[cfg(target_arch = "x86_64")]
+    eight: Workspace<Eight>,
 }
 
 impl Default for Engine {
@@ -59,9 +61,11 @@ impl Engine {
             width,
             one: Workspace::default(),
             #[cfg(target_arch = "x86_64")]
-            eight256: Workspace::default(),
+            wide: Workspace::default(),
             #[cfg(target_arch = "x86_64")]
-            eight512: Workspace::default(),
+            four: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            eight: Workspace::default(),
         }
     }
 
@@ -81,12 +85,18 @@ impl Engine {
                 Width::Avx2 => {
                     debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
                     // SAFETY: this variant exists only where the processor said that it has AVX2.
-                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, &mut self.eight256) };
+                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, &mut self.wide) };
                 }
                 Width::Avx512 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("avx512f"));
-                    // SAFETY: this variant exists only where the processor said that it has AVX-512F.
-                    return unsafe { run_avx512::<N>(kind, problem, tasks, owners, limits, &mut self.eight512) };
+                    debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
+                    // SAFETY: this variant exists only where the processor said that it has AVX-512F and VL.
+                    return unsafe {
+                        if kind == Kind::Doubled {
+                            run_avx512_doubled::<N>(problem, tasks, owners, limits, &mut self.four)
+                        } else {
+                            run_avx512_real::<N>(kind, problem, tasks, owners, limits, &mut self.eight)
+                        }
+                    };
                 }
             }
         }
@@ -125,22 +135,36 @@ fn run_avx2<const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
-    w: &mut Workspace<Eight256>,
+    w: &mut Workspace<Wide<1>>,
 ) {
-    run::<Eight256, N>(kind, problem, tasks, owners, limits, w);
+    run::<Wide<1>, N>(kind, problem, tasks, owners, limits, w);
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn run_avx512<const N: usize>(
+#[target_feature(enable = "avx512f,avx512vl")]
+fn run_avx512_real<const N: usize>(
     kind: Kind,
     problem: &Problem,
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
-    w: &mut Workspace<Eight512>,
+    w: &mut Workspace<Eight>,
 ) {
-    run::<Eight512, N>(kind, problem, tasks, owners, limits, w);
+    let kind = if kind == Kind::Certified { Kind::Certified } else { Kind::Real };
+    run::<Eight, N>(kind, problem, tasks, owners, limits, w);
+}
+
+/// Four at a time: the Hessian of eight would not stay in the first cache.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl")]
+fn run_avx512_doubled<const N: usize>(
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<Four>,
+) {
+    run::<Four, N>(Kind::Doubled, problem, tasks, owners, limits, w);
 }
 
 #[inline(always)]
