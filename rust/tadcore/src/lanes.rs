@@ -48,30 +48,37 @@ pub(crate) trait Number:
     }
 }
 
-/// √Σx², summed in order.
+/// √Σx².
 #[inline(always)]
 pub(crate) fn norm<T: Number>(numbers: &[T]) -> T {
     sum_of_squares(numbers).sqrt()
 }
 
-/// Σx², summed in order.
+/// Σx².
 #[inline(always)]
 pub(crate) fn sum_of_squares<T: Number>(numbers: &[T]) -> T {
-    let mut sum = T::splat(0.0);
-    for &x in numbers {
-        sum = sum + x * x;
-    }
-    sum
+    dot(numbers, numbers)
 }
 
-/// Σxy, summed in order.
+/// Σxy, in four sums that do not wait for one another.
 #[inline(always)]
-pub(crate) fn dot<T: Number>(a: &[T], b: &[T]) -> T {
-    let mut sum = T::splat(0.0);
-    for (&a, &b) in a.iter().zip(b) {
-        sum = sum + a * b;
+pub(crate) fn dot<T: Number>(x: &[T], y: &[T]) -> T {
+    let (mut s0, mut s1, mut s2, mut s3) = (T::splat(0.0), T::splat(0.0), T::splat(0.0), T::splat(0.0));
+    let len = x.len();
+    let y = &y[..len];
+    let mut i = 0;
+    while i + 4 <= len {
+        s0 = s0 + x[i] * y[i];
+        s1 = s1 + x[i + 1] * y[i + 1];
+        s2 = s2 + x[i + 2] * y[i + 2];
+        s3 = s3 + x[i + 3] * y[i + 3];
+        i += 4;
     }
-    sum
+    while i < len {
+        s0 = s0 + x[i] * y[i];
+        i += 1;
+    }
+    (s0 + s1) + (s2 + s3)
 }
 
 impl Number for f64 {

@@ -37,7 +37,7 @@ pub(super) trait Objective<T: Number> {
 const REST: f64 = 100.0;
 /// How fast predictions fall, from one step to the next, once Newton converges quadratically; in a narrow valley they
 /// fall slowly for hundreds of steps, and what they add up to cannot be foretold.
-const FALLING: f64 = 0.01;
+const FALLING: f64 = 0.1;
 /// Damping tried per iteration before giving up; each raises μ fourfold.
 const DAMPINGS: f64 = 80.0;
 /// First damping, relative to the largest diagonal entry of the Hessian.
