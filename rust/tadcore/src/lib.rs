@@ -64,6 +64,7 @@ pub mod cost;
 pub mod ensemble;
 pub mod error;
 pub mod game;
+mod lanes;
 pub mod network;
 pub mod policy;
 pub mod riccati;

@@ -10,16 +10,21 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 use std::time::Duration;
 
+use super::Policy;
 use super::budget::Budget;
+use super::closed_loop::FreeRows;
 use super::shelf::{Shelf, padded};
-use super::{Policy, StepPolicy};
 use crate::cancel::CancelToken;
 use crate::error::Cancelled;
 use crate::network::Topology;
-use crate::synthesis::Synthesizer;
+use crate::synthesis::{Problem, SIDE_BY_SIDE_UP_TO, Synthesizer};
 
 /// How long a thread waits for an entry that another one solves before it looks at its cancel token again.
 const PATIENCE: Duration = Duration::from_millis(20);
+
+/// Entries that a thread claims and solves at once, side by side: enough to keep eight lanes full, and few enough for
+/// other threads to have their share and for a cancellation to be noticed soon.
+const GROUP: usize = 64;
 
 /// Entries of one instant that a thread is solving right now.
 #[derive(Debug, Default)]
@@ -108,6 +113,14 @@ impl Transitions {
     }
 }
 
+/// What the entries of one instant have in common, and how many were solved.
+struct Instant {
+    problem: Problem,
+    free: FreeRows,
+    step: usize,
+    solved: u64,
+}
+
 /// What a thread needs to solve entries.
 #[derive(Debug, Default)]
 pub(crate) struct Filler {
@@ -130,57 +143,52 @@ impl Policy {
         cancel: &CancelToken,
     ) -> Result<u64, Cancelled> {
         let claims = &self.transitions.claims[step];
-        let problem = self.problem(step);
-        let free = self.free_rows(step);
-        let mut solved = 0;
-        let mut solve = |topology: &Topology, local: &mut Shelf| {
-            solved += 1;
-            match self.table.peek(step, topology) {
-                Some(known) => filler.lay_out(&known),
-                None => {
-                    let gains = filler.solver.solve(&problem, topology, crate::synthesis::Options::default());
-                    filler.square.resize(self.game.size().pow(2), 0.0);
-                    filler.closed_loop.resize(self.game.size().pow(2), 0.0);
-                    filler.row.resize(self.game.size(), 0.0);
-                    super::closed_loop::matrix(&free, &gains.rows, &mut filler.closed_loop);
-                    super::exponential::exponential(
-                        &filler.closed_loop,
-                        &free.attacker,
-                        self.game.grid().step(),
-                        &mut filler.square,
-                        &mut filler.row,
-                    );
-                    pad(&filler.square, self.game.size(), &mut filler.padded);
-                }
-            }
-            if !self.transitions.keep(step, topology.words(), &filler.padded, &self.budget) {
-                local.insert(topology.words(), &filler.padded);
-            }
-        };
         let held = |topology: &Topology| self.transitions.shelf(step).find(topology.words()) != 0;
-        for topology in missing {
+        let group = if self.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
+        let group = missing.len().div_ceil(missing.len().div_ceil(group).max(1)).max(1);
+        let mut instant = Instant { problem: self.problem(step), free: self.free_rows(step), step, solved: 0 };
+        for group in missing.chunks(group) {
             cancel.check()?;
-            if let Some(claim) = claims.claim(topology) {
-                if !held(topology) {
-                    solve(topology, local);
-                }
-                drop(claim);
-            }
+            let claimed: Vec<Claim> = group.iter().filter_map(|topology| claims.claim(topology)).collect();
+            let mine: Vec<&Topology> = claimed.iter().map(|claim| claim.topology).filter(|t| !held(t)).collect();
+            self.solve_group(&mut instant, &mine, local, filler);
         }
         for topology in missing {
             claims.wait(topology, cancel)?;
             // Past the budget, or left by a thread that was cancelled.
             if !held(topology) && local.find(topology.words()) == 0 {
-                solve(topology, local);
+                self.solve_group(&mut instant, &[topology], local, filler);
             }
         }
-        Ok(solved)
+        Ok(instant.solved)
     }
-}
 
-impl Filler {
-    fn lay_out(&mut self, known: &StepPolicy) {
-        pad(&known.transition, known.attacker.len(), &mut self.padded);
+    /// Solves entries of one instant together and stores them.
+    fn solve_group(&self, instant: &mut Instant, topologies: &[&Topology], local: &mut Shelf, filler: &mut Filler) {
+        let (n, step) = (self.game.size(), instant.step);
+        instant.solved += topologies.len() as u64;
+        let mut store = |topology: &Topology, matrix: &[f64], padded: &mut Vec<f64>| {
+            pad(matrix, n, padded);
+            if !self.transitions.keep(step, topology.words(), padded, &self.budget) {
+                local.insert(topology.words(), padded);
+            }
+        };
+        let mut unknown = Vec::new();
+        for &topology in topologies {
+            match self.table.peek(step, topology) {
+                Some(known) => store(topology, &known.transition, &mut filler.padded),
+                None => unknown.push(topology.clone()),
+            }
+        }
+        filler.square.resize(n * n, 0.0);
+        filler.closed_loop.resize(n * n, 0.0);
+        filler.row.resize(n, 0.0);
+        let Filler { solver, closed_loop, square, row, padded } = filler;
+        solver.solve_all(&instant.problem, &unknown, crate::synthesis::Options::default(), |index, gains| {
+            super::closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
+            super::exponential::exponential(closed_loop, &instant.free.attacker, self.game.grid().step(), square, row);
+            store(&unknown[index], square, padded);
+        });
     }
 }
 

@@ -5,9 +5,12 @@
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
 //! starts canonically, ends at a stationary point near its start, and does not look further.
 
-use super::newton::{Limits, Objective, Reached, Status};
-use super::objective::norm;
-use super::start::{Variable, advance, restrict};
+use super::newton::Objective;
+use super::objective::RealGains;
+use super::problem::Problem;
+use super::start::{Layout, Variable};
+use super::tasks::{Limits, Reached};
+use crate::lanes::norm;
 
 /// Values an Armijo test may look back at.
 const MEMORY: usize = 10;
@@ -15,28 +18,23 @@ const MEMORY: usize = 10;
 const HALVINGS: usize = 60;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
-pub(super) fn descend<O: Objective>(
-    objective: &mut O,
-    g: &mut [f64],
-    variables: &[Variable],
-    limits: Limits,
-) -> Reached {
-    let d = variables.len();
+pub(super) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
+    let mut objective = RealGains::<f64, 0>::new(problem);
+    let mut layout = Layout::default();
+    layout.list([variables, &[], &[], &[], &[], &[], &[], &[]], g.len(), 1);
+    let d = layout.len();
     let mut full = vec![0.0; objective.width()];
     let (mut gradient, mut next) = (vec![0.0; d], vec![0.0; d]);
     let mut value = objective.value(g);
     objective.gradient(g, &mut full);
-    restrict(&full, variables, &mut gradient);
+    layout.restrict(&full, &mut gradient);
     let mut recent = [value; MEMORY];
     let mut length = 0.1 * norm(g) / norm(&gradient).max(f64::MIN_POSITIVE);
     let mut iterations = 0;
-    let status = loop {
+    loop {
         let (slope, scale) = (norm(&gradient), objective.gradient_scale(g));
-        if slope <= limits.tolerance * scale {
-            break Status::Converged;
-        }
-        if iterations == limits.iterations {
-            break if slope <= limits.acceptable * scale { Status::Converged } else { Status::IterationLimit };
+        if slope <= limits.tolerance * scale || iterations == limits.iterations {
+            break;
         }
         iterations += 1;
         let reference = recent.iter().fold(f64::NEG_INFINITY, |a: f64, &b| a.max(b));
@@ -44,7 +42,7 @@ pub(super) fn descend<O: Objective>(
         for _ in 0..HALVINGS {
             let step: Vec<f64> = gradient.iter().map(|x| -length * x).collect();
             let mut trial = g.to_vec();
-            advance(&mut trial, variables, &step);
+            layout.advance(&mut trial, &step);
             let reached = objective.value(&trial);
             if reached <= reference - 1e-4 * length * slope * slope {
                 taken = Some((trial, step, reached));
@@ -54,20 +52,17 @@ pub(super) fn descend<O: Objective>(
         }
         let Some((trial, step, reached)) = taken else {
             value = objective.value(g);
-            break if slope <= limits.acceptable * scale { Status::Converged } else { Status::Stalled };
+            break;
         };
         g.copy_from_slice(&trial);
         value = reached;
         recent[iterations % MEMORY] = value;
         objective.gradient(g, &mut full);
-        restrict(&full, variables, &mut next);
+        layout.restrict(&full, &mut next);
         let ss: f64 = step.iter().map(|s| s * s).sum();
         let sy: f64 = step.iter().zip(next.iter().zip(&gradient)).map(|(s, (n, o))| s * (n - o)).sum();
         length = if sy > 0.0 { ss / sy } else { 2.0 * length };
         std::mem::swap(&mut gradient, &mut next);
-    };
-    let scale = objective.gradient_scale(g);
-    let slope = norm(&gradient);
-    let gradient_norm = if slope == 0.0 { 0.0 } else { slope / scale };
-    Reached { value, gradient_norm, iterations, status }
+    }
+    Reached::new(value, norm(&gradient), objective.gradient_scale(g), iterations, &limits)
 }

@@ -4,20 +4,21 @@
 //!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
 //! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a fixed
 //!    pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes back
-//!    to the real gains A, A + B and A − B, from where Newton finishes.
-//! 3. A last look: Newton from the canonical start without one row at a time, then from the best point with one row or
-//!    two rows reversed, again while that goes lower: GᵀRG does not see the sign of a row, so minima come in families
-//!    that differ by signs.
+//!    to the real gains A, A + B and A − B, from where Newton finishes; so it does from the canonical start without one
+//!    row at a time.
+//! 3. A last look: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG does
+//!    not see the sign of a row, so minima come in families that differ by signs.
 //!
-//! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. Everything here is a
+//! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. The networks of one instant
+//! go through these stages together, their descents side by side; the rival that lets a descent end early is the best
+//! point before its stage, so no network's answer depends on which others were asked for. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
 
-use super::complex::{ComplexGains, minimise_complex};
-use super::newton::{Limits, Objective, Reached, Rival, Workspace};
-use super::objective::{RealGains, minimise_real, norm};
+use super::engine::{Engine, Kind};
 use super::problem::Problem;
 use super::start::{self, Variable};
-use crate::width::Width;
+use super::tasks::{Limits, Owner, Reached, Rival, Tasks};
+use crate::lanes::norm;
 
 /// The look that won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,243 +48,254 @@ const ROUNDS: usize = 4;
 /// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
 /// of them mean a narrow valley, whose floor is worth following to its end.
 const QUICK: usize = 30;
-/// Distance, relative to the best gains, at which a descent is taken to be back at them.
+/// Iterations, at most, after the tolerance is met in such a valley.
+const POLISH: usize = 50;
+/// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as
+/// small makes no other points of A + B and A − B.
 const BACK: f64 = 1e-3;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
-/// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
-const CERTIFICATE_ROUNDING: f64 = 1e-12;
 
-/// Scratch reused from solve to solve.
+/// One network at the instant: its variables, and the best gains found so far.
 #[derive(Debug)]
-pub(super) struct Scratch {
-    width: Width,
-    pub(super) newton: Workspace,
-    doubled: Vec<Variable>,
-    pair: Vec<f64>,
-    shift: Vec<f64>,
-    trial: Vec<f64>,
-    form: Vec<f64>,
-    restricted: Vec<f64>,
-}
-
-impl Default for Scratch {
-    fn default() -> Self {
-        let empty = Vec::new;
-        Self {
-            width: Width::detect(),
-            newton: Workspace::default(),
-            doubled: Vec::new(),
-            pair: empty(),
-            shift: empty(),
-            trial: empty(),
-            form: empty(),
-            restricted: empty(),
-        }
-    }
-}
-
-/// The best point of all looks.
-pub(super) struct Best {
+pub(super) struct Entry {
+    pub variables: Vec<Variable>,
+    start: Vec<f64>,
+    pub g: Vec<f64>,
     pub reached: Reached,
     pub look: Look,
     pub certified: bool,
+    /// Iterations of all descents together.
     pub iterations: usize,
     quick: bool,
 }
 
-/// Finds the global minimum of Θ on `variables` from the canonical start in `g`, and leaves it there.
-pub(super) fn search<const N: usize, const M: usize>(
-    problem: &Problem,
-    variables: &[Variable],
-    g: &mut [f64],
-    limits: Limits,
-    s: &mut Scratch,
-) -> Best {
-    let start = g.to_vec();
-    let mut real = RealGains::<N, M>::new(problem, 1);
-    let reached = minimise_real(s.width, &mut real, g, variables, limits, None, &mut s.newton);
-    let certified = certify(&mut real, g, variables, s);
-    let mut best = Best {
-        reached,
-        look: Look::Canonical,
-        certified,
-        iterations: reached.iterations,
-        quick: reached.iterations <= QUICK,
-    };
-    if certified {
-        return best;
-    }
-    let scales = (real.gradient_scale(&start), real.value_scale());
-    let mut complex = ComplexGains::<N, M>::new(problem, scales);
-    look(&mut complex, Look::Complex, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    let mut stacked = RealGains::<N, M>::new(problem, 2);
-    look(&mut stacked, Look::Stacked, problem, &mut real, variables, &start, g, &mut best, limits, s);
-    for i in 0..problem.rows {
-        scale_rows(problem.size, &start, &[i, i], 0.0, &mut s.trial);
-        finish(Look::Reversed, &mut real, variables, g, &mut best, limits, s);
-    }
-    for _ in 0..ROUNDS {
-        let before = best.reached.value;
-        reversals(problem, &mut real, variables, g, &mut best, limits, s);
-        if best.reached.value == before {
-            break;
+impl Entry {
+    /// A network that starts from `start`.
+    pub(super) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
+        Self {
+            variables,
+            g: start.clone(),
+            start,
+            reached: Reached::default(),
+            look: Look::Canonical,
+            certified: false,
+            iterations: 0,
+            quick: false,
         }
     }
-    if best.look != Look::Canonical {
-        best.certified = certify(&mut real, g, variables, s);
+
+    fn owner(&self) -> Owner<'_> {
+        let rival = Rival { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
+        Owner { variables: &self.variables, rival: self.quick.then_some(rival) }
     }
-    best
-}
 
-/// A problem in twice as many gains.
-trait Doubled {
-    fn descend(
-        &mut self,
-        width: Width,
-        g: &mut [f64],
-        variables: &[Variable],
-        limits: Limits,
-        w: &mut Workspace,
-    ) -> Reached;
-}
+    /// Keeps what a descent of `look` reached.
+    fn take(&mut self, look: Look, g: &[f64], reached: Reached) {
+        self.g.copy_from_slice(g);
+        (self.reached, self.look) = (reached, look);
+    }
 
-impl<const N: usize, const M: usize> Doubled for ComplexGains<'_, N, M> {
-    fn descend(
-        &mut self,
-        width: Width,
-        g: &mut [f64],
-        variables: &[Variable],
-        limits: Limits,
-        w: &mut Workspace,
-    ) -> Reached {
-        minimise_complex(width, self, g, variables, limits, w)
+    /// Keeps what a descent of a further look reached when it is lower; says whether it is.
+    fn offer(&mut self, look: Look, g: &[f64], reached: Reached) -> bool {
+        self.iterations += reached.iterations;
+        let lower = reached.value < self.reached.value - TIE * self.reached.value.abs();
+        if lower {
+            self.take(look, g, reached);
+        }
+        lower
     }
 }
 
-impl<const N: usize, const M: usize> Doubled for RealGains<'_, N, M> {
-    fn descend(
-        &mut self,
-        width: Width,
-        g: &mut [f64],
-        variables: &[Variable],
-        limits: Limits,
-        w: &mut Workspace,
-    ) -> Reached {
-        minimise_real(width, self, g, variables, limits, None, w)
-    }
+/// What a search needs besides its entries.
+pub(super) struct Search<'a> {
+    pub problem: &'a Problem,
+    pub limits: Limits,
+    pub engine: &'a mut Engine,
+    pub tasks: &'a mut Tasks,
 }
 
-/// Newton from the point in `g` with one row or two rows reversed.
-fn reversals<const N: usize, const M: usize>(
-    problem: &Problem,
-    real: &mut RealGains<N, M>,
-    variables: &[Variable],
-    g: &mut [f64],
-    best: &mut Best,
-    limits: Limits,
-    s: &mut Scratch,
-) {
-    let from = g.to_vec();
-    let m = problem.rows;
-    for i in 0..m {
-        let partners = if m <= PAIRS_UP_TO { i..m } else { i..i + 1 };
-        for j in partners {
-            scale_rows(problem.size, &from, &[i, j], -1.0, &mut s.trial);
-            if s.trial != from {
-                finish(Look::Reversed, real, variables, g, best, limits, s);
+impl Search<'_> {
+    /// Finds the global minimum of Θ for every entry.
+    pub(super) fn run<const N: usize>(&mut self, entries: &mut [Entry]) {
+        self.start(1);
+        for (e, entry) in entries.iter().enumerate() {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&entry.start);
+        }
+        self.descend::<N>(Kind::Certified, entries);
+        for (task, entry) in entries.iter_mut().enumerate() {
+            let reached = self.tasks.reached(task);
+            entry.take(Look::Canonical, self.tasks.point(task), reached);
+            entry.iterations = reached.iterations;
+            entry.certified = self.tasks.certified(task);
+            entry.quick = entry.iterations <= QUICK;
+        }
+        let open: Vec<usize> = (0..entries.len()).filter(|&e| !entries[e].certified).collect();
+        if !open.is_empty() {
+            self.look_further::<N>(entries, &open);
+        }
+        self.polish::<N>(entries);
+    }
+
+    /// Everything beyond the first descent, for the entries `open`.
+    fn look_further<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) {
+        let looks = self.double::<N>(entries, open);
+        self.finish::<N>(entries, &looks);
+        let mut lower = open.to_vec();
+        for _ in 0..ROUNDS {
+            self.start(1);
+            for &e in &lower {
+                self.reverse(e, &entries[e].g);
+            }
+            let looks = vec![Look::Reversed; self.tasks.len()];
+            lower = self.finish::<N>(entries, &looks);
+            if lower.is_empty() {
+                break;
+            }
+        }
+        // Where a later look won there is another point to be tried for the certificate.
+        let won: Vec<usize> = open.iter().copied().filter(|&e| entries[e].look != Look::Canonical).collect();
+        self.certify::<N>(entries, &won);
+    }
+
+    /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
+    /// long as the gradient falls.
+    fn polish<const N: usize>(&mut self, entries: &mut [Entry]) {
+        self.start(1);
+        for (e, entry) in entries.iter().enumerate().filter(|(_, entry)| !entry.quick) {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&entry.g);
+        }
+        if self.tasks.len() == 0 {
+            return;
+        }
+        let limits = self.limits;
+        self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
+        self.descend::<N>(Kind::Real, entries);
+        self.limits = limits;
+        for task in 0..self.tasks.len() {
+            let (entry, reached) = (&mut entries[self.tasks.owner(task)], self.tasks.reached(task));
+            entry.iterations += reached.iterations;
+            if reached.gradient_norm < entry.reached.gradient_norm {
+                entry.take(entry.look, self.tasks.point(task), reached);
             }
         }
     }
+
+    /// Empties the list for points of as many copies of the gains.
+    fn start(&mut self, copies: usize) {
+        self.tasks.clear(self.problem.rows * self.problem.size, copies);
+    }
+
+    /// Makes the listed descents, without rivals.
+    fn descend<const N: usize>(&mut self, kind: Kind, entries: &[Entry]) {
+        let owners: Vec<Owner> = entries.iter().map(|e| Owner { variables: &e.variables, rival: None }).collect();
+        self.engine.run::<N>(kind, self.problem, self.tasks, &owners, self.limits);
+    }
+
+    /// Descends in doubled gains, and lists the starts that come of it and those without one row: the look of each.
+    fn double<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
+        let (n, m) = (self.problem.size, self.problem.rows);
+        let scale = norm(&self.problem.fne);
+        self.start(2);
+        for &e in open {
+            for complex in [true, false] {
+                far_start(&entries[e], scale, self.tasks.add(e, complex, entries[e].reached.scale));
+            }
+        }
+        let limits = std::mem::replace(
+            &mut self.limits,
+            Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale },
+        );
+        self.descend::<N>(Kind::Doubled, entries);
+        self.limits = limits;
+
+        let doubled = std::mem::take(self.tasks);
+        self.start(1);
+        let mut looks = Vec::new();
+        for task in 0..doubled.len() {
+            let e = doubled.owner(task);
+            entries[e].iterations += doubled.reached(task).iterations;
+            let look = if doubled.kind(task).0 { Look::Complex } else { Look::Stacked };
+            let (a, b) = doubled.point(task).split_at(m * n);
+            let signs = if norm(b) <= BACK * norm(a) { &[0.0][..] } else { &[0.0, 1.0, -1.0] };
+            for &sign in signs {
+                for (x, (a, b)) in self.tasks.add(e, false, 0.0).iter_mut().zip(a.iter().zip(b)) {
+                    *x = a + sign * b;
+                }
+                looks.push(look);
+            }
+            if look == Look::Stacked {
+                for i in 0..m {
+                    scale_rows(n, &entries[e].start, &[i], 0.0, self.tasks.add(e, false, 0.0));
+                    looks.push(Look::Reversed);
+                }
+            }
+        }
+        looks
+    }
+
+    /// Makes the listed descents and keeps what is lower; which entries that changed.
+    fn finish<const N: usize>(&mut self, entries: &mut [Entry], looks: &[Look]) -> Vec<usize> {
+        let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
+        self.engine.run::<N>(Kind::Real, self.problem, self.tasks, &owners, self.limits);
+        let mut lower = Vec::new();
+        for (task, &look) in looks.iter().enumerate() {
+            let e = self.tasks.owner(task);
+            if entries[e].offer(look, self.tasks.point(task), self.tasks.reached(task)) && lower.last() != Some(&e) {
+                lower.push(e);
+            }
+        }
+        lower
+    }
+
+    /// Lists the point `g` of an entry with one row or two rows reversed.
+    fn reverse(&mut self, e: usize, g: &[f64]) {
+        let (n, m) = (self.problem.size, self.problem.rows);
+        let used: Vec<usize> = (0..m).filter(|&i| g[i * n..(i + 1) * n].iter().any(|&x| x != 0.0)).collect();
+        for (k, &i) in used.iter().enumerate() {
+            scale_rows(n, g, &[i], -1.0, self.tasks.add(e, false, 0.0));
+            if m <= PAIRS_UP_TO {
+                for &j in &used[k + 1..] {
+                    scale_rows(n, g, &[i, j], -1.0, self.tasks.add(e, false, 0.0));
+                }
+            }
+        }
+    }
+
+    /// Tries the certificate at the best point of each of `which`.
+    pub(super) fn certify<const N: usize>(&mut self, entries: &mut [Entry], which: &[usize]) {
+        if which.is_empty() {
+            return;
+        }
+        self.start(1);
+        for &e in which {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&entries[e].g);
+        }
+        let limits = self.limits;
+        self.limits.iterations = 0;
+        self.descend::<N>(Kind::Certified, entries);
+        self.limits = limits;
+        for task in 0..self.tasks.len() {
+            entries[self.tasks.owner(task)].certified = self.tasks.certified(task);
+        }
+    }
 }
 
-/// The gains with the named rows times `factor` (a row named twice once).
-fn scale_rows(n: usize, from: &[f64], rows: &[usize; 2], factor: f64, out: &mut Vec<f64>) {
-    out.clear();
-    out.extend_from_slice(from);
-    let distinct = if rows[0] == rows[1] { &rows[..1] } else { &rows[..] };
-    for &i in distinct {
+/// Writes the gains with the named rows times `factor`.
+fn scale_rows(n: usize, from: &[f64], rows: &[usize], factor: f64, out: &mut [f64]) {
+    out.copy_from_slice(from);
+    for &i in rows {
         out[i * n..(i + 1) * n].iter_mut().for_each(|x| *x *= factor);
     }
 }
 
-/// A fixed pattern of numbers between −size and size, without symmetry: the golden angle spreads it.
-fn spread(len: usize, size: f64, phase: f64, out: &mut Vec<f64>) {
-    out.clear();
-    out.extend((0..len).map(|v| size * (phase + phase * 2.399_963_229_728_653 * v as f64).cos()));
-}
-
-/// Descends in a doubled problem from the canonical start and comes back to the real one.
-fn look<const N: usize, const M: usize, O: Doubled>(
-    doubled: &mut O,
-    name: Look,
-    problem: &Problem,
-    real: &mut RealGains<N, M>,
-    variables: &[Variable],
-    start: &[f64],
-    g: &mut [f64],
-    best: &mut Best,
-    limits: Limits,
-    s: &mut Scratch,
-) {
-    let (width, scale) = (start.len(), norm(&problem.fne));
-    s.doubled.clear();
-    s.doubled.extend_from_slice(variables);
-    s.doubled.extend(variables.iter().map(|v| Variable { entry: v.entry + width, own: v.own + width, ..*v }));
-    let size = FAR * scale / (variables.len() as f64).sqrt();
-    spread(variables.len(), size, 1.0, &mut s.shift);
-    s.pair.clear();
-    s.pair.extend_from_slice(start);
-    s.pair.resize(2 * width, 0.0);
-    start::advance(&mut s.pair[width..], variables, &s.shift);
-    let short =
-        Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale };
-    best.iterations += doubled.descend(s.width, &mut s.pair, &s.doubled, short, &mut s.newton).iterations;
-    for sign in [0.0, 1.0, -1.0] {
-        let (a, b) = s.pair.split_at(width);
-        s.trial.clear();
-        s.trial.extend(a.iter().zip(b).map(|(a, b)| a + sign * b));
-        finish(name, real, variables, g, best, limits, s);
-    }
-}
-
-/// Newton from `s.trial`; keeps the point in `g` when it is lower.
-fn finish<const N: usize, const M: usize>(
-    name: Look,
-    real: &mut RealGains<N, M>,
-    variables: &[Variable],
-    g: &mut [f64],
-    best: &mut Best,
-    limits: Limits,
-    s: &mut Scratch,
-) {
-    let rival = Rival { g, value: best.reached.value, near: BACK * norm(g) };
-    let reached =
-        minimise_real(s.width, real, &mut s.trial, variables, limits, best.quick.then_some(rival), &mut s.newton);
-    best.iterations += reached.iterations;
-    if reached.value < best.reached.value - TIE * best.reached.value.abs() {
-        g.copy_from_slice(&s.trial);
-        best.reached = reached;
-        best.look = name;
-    }
-}
-
-/// Whether the certificate proves the critical point `g` to be a global minimiser.
-pub(super) fn certify<const N: usize, const M: usize>(
-    real: &mut RealGains<N, M>,
-    g: &[f64],
-    variables: &[Variable],
-    s: &mut Scratch,
-) -> bool {
-    let (d, width) = (variables.len(), real.width());
-    real.value(g);
-    s.form.resize(width * width, 0.0);
-    s.restricted.resize(d * d, 0.0);
-    real.certificate_form(&mut s.form);
-    start::restrict_form(&s.form, width, variables, &mut s.restricted, d);
-    let largest = (0..d).fold(0.0, |m: f64, i| m.max(s.restricted[i * d + i].abs()));
-    for i in 0..d {
-        s.restricted[i * d + i] += CERTIFICATE_ROUNDING * largest;
-    }
-    largest == 0.0 || super::dense::factorise(&mut s.restricted[..d * d], d)
+/// Writes the canonical start with a second part B along the variables, in a fixed pattern as large as the gains F and
+/// without symmetry: the golden angle spreads it.
+fn far_start(entry: &Entry, scale: f64, out: &mut [f64]) {
+    let (a, b) = out.split_at_mut(entry.start.len());
+    a.copy_from_slice(&entry.start);
+    let unknowns = entry.variables.len();
+    let size = FAR * scale / (unknowns as f64).sqrt();
+    let pattern: Vec<f64> = (0..unknowns).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()).collect();
+    start::advance(b, &entry.variables, &pattern);
 }

@@ -19,23 +19,26 @@
 //! Sizes N ≤ 8 are compiled with constant loop bounds (measured at n = 3: 2.6 times as fast as with bounds known at run
 //! time); larger ones share one version whose factorisations go to faer.
 
-mod complex;
 mod dense;
 mod descent;
+mod doubled;
+mod engine;
 pub mod looks;
 mod newton;
 mod objective;
 mod problem;
 mod start;
+mod tasks;
 
+pub(crate) use engine::SIDE_BY_SIDE_UP_TO;
 pub use looks::Look;
-pub use newton::Status;
 pub use problem::Problem;
+pub use tasks::Status;
 
 use crate::network::Topology;
-use newton::Limits;
-use objective::RealGains;
-use start::Variable;
+use engine::Engine;
+use looks::{Entry, Search};
+use tasks::{Limits, Tasks};
 
 /// How the gains are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -113,8 +116,8 @@ impl Gains {
 /// A solver with its scratch memory; one per thread.
 #[derive(Debug, Default)]
 pub struct Synthesizer {
-    variables: Vec<Variable>,
-    scratch: looks::Scratch,
+    engine: Engine,
+    tasks: Tasks,
 }
 
 impl Synthesizer {
@@ -126,79 +129,99 @@ impl Synthesizer {
 
     /// The gains for `topology` at the instant of `problem`.
     pub fn solve(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Gains {
-        match (problem.size, problem.rows) {
-            (2, 1) => self.solve_sized::<2, 1>(problem, topology, options),
-            (2, 2) => self.solve_sized::<2, 2>(problem, topology, options),
-            (3, 2) => self.solve_sized::<3, 2>(problem, topology, options),
-            (3, 3) => self.solve_sized::<3, 3>(problem, topology, options),
-            (4, 3) => self.solve_sized::<4, 3>(problem, topology, options),
-            (4, 4) => self.solve_sized::<4, 4>(problem, topology, options),
-            (5, 4) => self.solve_sized::<5, 4>(problem, topology, options),
-            (5, 5) => self.solve_sized::<5, 5>(problem, topology, options),
-            (6, 5) => self.solve_sized::<6, 5>(problem, topology, options),
-            (6, 6) => self.solve_sized::<6, 6>(problem, topology, options),
-            (7, 6) => self.solve_sized::<7, 6>(problem, topology, options),
-            (7, 7) => self.solve_sized::<7, 7>(problem, topology, options),
-            (8, 7) => self.solve_sized::<8, 7>(problem, topology, options),
-            (8, 8) => self.solve_sized::<8, 8>(problem, topology, options),
-            _ => self.solve_sized::<0, 0>(problem, topology, options),
+        let mut gains = None;
+        self.solve_all(problem, std::slice::from_ref(topology), options, |_, found| gains = Some(found));
+        gains.unwrap_or_else(|| unreachable!("one network, one answer"))
+    }
+
+    /// The gains for each of `topologies` at the instant of `problem`, handed to `each` with the topology's index. The
+    /// descents of all go side by side, and none depends on another: the gains are those that [`Self::solve`] gives.
+    pub fn solve_all(
+        &mut self,
+        problem: &Problem,
+        topologies: &[Topology],
+        options: Options,
+        each: impl FnMut(usize, Gains),
+    ) {
+        match problem.size {
+            2 => self.solve_sized::<2>(problem, topologies, options, each),
+            3 => self.solve_sized::<3>(problem, topologies, options, each),
+            4 => self.solve_sized::<4>(problem, topologies, options, each),
+            5 => self.solve_sized::<5>(problem, topologies, options, each),
+            6 => self.solve_sized::<6>(problem, topologies, options, each),
+            7 => self.solve_sized::<7>(problem, topologies, options, each),
+            8 => self.solve_sized::<8>(problem, topologies, options, each),
+            _ => self.solve_sized::<0>(problem, topologies, options, each),
         }
     }
 
-    fn solve_sized<const N: usize, const M: usize>(
+    fn solve_sized<const N: usize>(
         &mut self,
         problem: &Problem,
-        topology: &Topology,
+        topologies: &[Topology],
         options: Options,
-    ) -> Gains {
-        let mut rows = vec![0.0; problem.rows * problem.size];
-        start::canonical(problem, topology, &mut rows);
-        start::variables(topology, &mut self.variables);
+        mut each: impl FnMut(usize, Gains),
+    ) {
         let limits = Limits {
             iterations: options.max_iterations,
             tolerance: TOLERANCE.0,
             acceptable: TOLERANCE.1,
             longest: f64::INFINITY,
         };
-        let (reached, look, certified, iterations) = match options.method {
-            Method::Newton => {
-                let best = looks::search::<N, M>(problem, &self.variables, &mut rows, limits, &mut self.scratch);
-                (best.reached, best.look, best.certified, best.iterations)
-            }
+        let mut entries: Vec<Entry> = topologies
+            .iter()
+            .map(|topology| {
+                let mut start = vec![0.0; problem.rows * problem.size];
+                start::canonical(problem, topology, &mut start);
+                Entry::new(start::variables(topology), start)
+            })
+            .collect();
+        let mut search = Search { problem, limits, engine: &mut self.engine, tasks: &mut self.tasks };
+        match options.method {
+            Method::Newton => search.run::<N>(&mut entries),
             Method::Descent => {
-                start::paper_variables(topology, &mut self.variables);
-                let mut real = RealGains::<N, M>::new(problem, 1);
-                let reached = descent::descend(&mut real, &mut rows, &self.variables, limits);
-                let certified = looks::certify(&mut real, &rows, &self.variables, &mut self.scratch);
-                (reached, Look::Canonical, certified, reached.iterations)
+                for (entry, topology) in entries.iter_mut().zip(topologies) {
+                    let variables = start::paper_variables(topology);
+                    entry.reached = descent::descend(problem, &mut entry.g, &variables, limits);
+                    entry.iterations = entry.reached.iterations;
+                }
+                let all: Vec<usize> = (0..entries.len()).collect();
+                search.certify::<N>(&mut entries, &all);
             }
-        };
-        Gains {
-            rows,
-            theta: reached.value,
-            gradient_norm: reached.gradient_norm,
-            iterations,
-            status: reached.status,
-            certified: certified && reached.status == Status::Converged,
-            look,
+        }
+        for (index, entry) in entries.into_iter().enumerate() {
+            each(
+                index,
+                Gains {
+                    rows: entry.g,
+                    theta: entry.reached.value,
+                    gradient_norm: entry.reached.gradient_norm,
+                    iterations: entry.iterations,
+                    status: entry.reached.status,
+                    certified: entry.certified && entry.reached.status == Status::Converged,
+                    look: entry.look,
+                },
+            );
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::complex::ComplexGains;
+    use super::doubled::Doubled;
     use super::newton::Objective;
     use super::objective::RealGains;
     use super::*;
     use crate::game::Interaction;
+    use crate::width::Width;
 
-    fn check(objective: &mut impl Objective, g: &[f64]) {
+    fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
         let width = objective.width();
         let h = 1e-5;
         let (mut gradient, mut hessian) = (vec![0.0; width], vec![0.0; width * width]);
         objective.value(g);
         objective.gradient(g, &mut gradient);
+        objective.keep(true);
         objective.hessian(g, &mut hessian);
         for a in 0..width {
             let mut probe = |shift: f64| {
@@ -245,9 +268,40 @@ mod tests {
     fn derivatives_match_differences() {
         for interaction in [Interaction::I1, Interaction::I2] {
             let (problem, _, g) = sample(interaction);
-            check(&mut RealGains::<0, 0>::new(&problem, 1), &g[..g.len() / 2]);
-            check(&mut RealGains::<0, 0>::new(&problem, 2), &g);
-            check(&mut ComplexGains::<0, 0>::new(&problem, (1.0, 1.0)), &g);
+            check(&mut RealGains::<f64, 0>::new(&problem), &g[..g.len() / 2]);
+            for complex in [true, false] {
+                let mut doubled = Doubled::<f64, 0>::new(&problem);
+                doubled.set_lane(0, complex, 1.0);
+                check(&mut doubled, &g);
+            }
+        }
+    }
+
+    /// Every width, alone and with neighbours, on networks from empty to complete: the same bits.
+    #[test]
+    fn neighbours_and_width_change_nothing() {
+        for interaction in [Interaction::I1, Interaction::I2] {
+            let (problem, _, _) = sample(interaction);
+            let (m, n) = (problem.rows(), problem.size());
+            let topologies: Vec<Topology> = (0..1u64 << (m * n))
+                .step_by(if m * n > 9 { 29 } else { 3 })
+                .map(|bits| Topology::from_words(m, n, &[bits]))
+                .collect();
+            let solve = |width, topologies: &[Topology]| {
+                let mut solver = Synthesizer { engine: Engine::of(width), tasks: Tasks::default() };
+                let mut all = Vec::new();
+                solver.solve_all(&problem, topologies, Options::default(), |_, gains| all.push(gains));
+                all
+            };
+            let alone: Vec<Gains> =
+                topologies.iter().flat_map(|topology| solve(Width::Baseline, std::slice::from_ref(topology))).collect();
+            assert!(alone.iter().any(|gains| !gains.certified), "no network needs a further look");
+            for width in Width::all() {
+                assert_eq!(solve(width, &topologies), alone, "{width:?}");
+                for (topology, gains) in topologies.iter().zip(&alone) {
+                    assert_eq!(&solve(width, std::slice::from_ref(topology))[0], gains, "{width:?}");
+                }
+            }
         }
     }
 
@@ -256,7 +310,7 @@ mod tests {
         for interaction in [Interaction::I1, Interaction::I2] {
             let (problem, p, g) = sample(interaction);
             let g = &g[..g.len() / 2];
-            let value = RealGains::<0, 0>::new(&problem, 1).value(g);
+            let value = RealGains::<f64, 0>::new(&problem).value(g);
             let sum = problem.weigh(&problem.terms(&p, g));
             assert!((sum - value).abs() < 1e-12 * value);
         }

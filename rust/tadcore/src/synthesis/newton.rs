@@ -1,236 +1,334 @@
-//! Newton's method with the exact Hessian, damped by a multiple of the identity.
+//! Newton's method with the exact Hessian, damped by a multiple of the identity; several descents side by side.
 //!
 //! Each iteration factorises H + μ**I** with μ raised until the matrix is positive definite and the step pays (the ratio
 //! of actual to predicted decrease is positive), and lowered after good steps; with μ = 0 the last iterations converge
 //! quadratically. Where rounding hides the decrease of Θ, a step that lowers the gradient is taken instead. Every loop
 //! is bounded, and the bound met is a [`Status`].
+//!
+//! A list of descents is worked through in the lanes of a [`Number`]: each lane is at its own point, with its own μ, and
+//! takes the next descent of the list when its own has ended. No lane sees another, so what a descent gives does not
+//! depend on its neighbours, nor on whether it had any.
 
 use super::dense;
-use super::start::{Variable, advance, restrict, restrict_form};
+use super::start::{Layout, Variable};
+use super::tasks::{Limits, Owner, Reached, Tasks};
+use crate::lanes::{Number, dot, norm, sum_of_squares};
 
 /// A function of gains laid out as one vector of `width` entries.
-pub(super) trait Objective {
+pub(super) trait Objective<T: Number> {
     fn width(&self) -> usize;
-    /// The value at `g`; what it computes on the way serves the next gradient and Hessian.
-    fn value(&mut self, g: &[f64]) -> f64;
+    /// Tells a lane which kind of doubled gains it is to hold, and the scale of their gradient.
+    fn set_lane(&mut self, _lane: usize, _complex: bool, _scale: f64) {}
+    /// The value at `g`; what it computes on the way serves the next gradient and, once kept, the Hessian.
+    fn value(&mut self, g: &[T]) -> T;
     /// The gradient at the point last evaluated.
-    fn gradient(&mut self, g: &[f64], out: &mut [f64]);
-    /// The Hessian at the point last evaluated, row-major; at least the blocks on and below the diagonal.
-    fn hessian(&mut self, g: &[f64], out: &mut [f64]);
-    /// Size of the parts that cancel in the gradient at `g`: what its norm is relative to.
-    fn gradient_scale(&self, g: &[f64]) -> f64;
+    fn gradient(&mut self, g: &[T], out: &mut [T]);
+    /// Keeps the point last evaluated, in these lanes, for the Hessian.
+    fn keep(&mut self, lanes: T::Mask);
+    /// The Hessian at the point kept, row-major; at least the blocks on and below the diagonal.
+    fn hessian(&mut self, g: &[T], out: &mut [T]);
+    /// Size of the parts that cancel in the gradient at the point last evaluated: what its norm is relative to.
+    fn gradient_scale(&self, g: &[T]) -> T;
     /// Size of the parts of the value: what its rounding is relative to.
     fn value_scale(&self) -> f64;
-}
-
-/// How a minimisation ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
-    /// The relative gradient norm fell below the tolerance.
-    Converged,
-    /// Rounding stopped the progress above the tolerance.
-    Stalled,
-    /// The iteration limit was met.
-    IterationLimit,
-}
-
-impl Status {
-    /// A word for each status.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Converged => "converged",
-            Self::Stalled => "stalled",
-            Self::IterationLimit => "iteration_limit",
-        }
-    }
-}
-
-/// When to stop, and how far one step may go.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
-    pub iterations: usize,
-    /// Relative gradient norm aimed at.
-    pub tolerance: f64,
-    /// Relative gradient norm that counts as converged when rounding stops the progress.
-    pub acceptable: f64,
-    /// Longest step, `f64::INFINITY` for none.
-    pub longest: f64,
-}
-
-impl Limits {
-    fn end(&self, value: f64, slope: f64, scale: f64, iterations: usize, limit: bool) -> Reached {
-        let relative = if slope == 0.0 { 0.0 } else { slope / scale };
-        let status = match (relative <= self.acceptable, limit) {
-            (true, _) => Status::Converged,
-            (false, true) => Status::IterationLimit,
-            (false, false) => Status::Stalled,
-        };
-        Reached { value, gradient_norm: relative, iterations, status }
-    }
-}
-
-/// The best point known: a descent that only leads back to it, or cannot get below it, need not be finished.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rival<'a> {
-    pub g: &'a [f64],
-    pub value: f64,
-    /// Distance at which a descent has come back to it.
-    pub near: f64,
 }
 
 /// How much of a Newton step's predicted decrease the steps after it may add, once the prediction holds.
 const REST: f64 = 100.0;
 /// How fast predictions fall, from one step to the next, once Newton converges quadratically; in a narrow valley they
 /// fall slowly for hundreds of steps, and what they add up to cannot be foretold.
-const FALLING: f64 = 0.01;
-
-/// What a minimisation reached.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reached {
-    pub value: f64,
-    pub gradient_norm: f64,
-    pub iterations: usize,
-    pub status: Status,
-}
-
-/// Scratch that is reused from solve to solve.
-#[derive(Debug, Default)]
-pub(super) struct Workspace {
-    full: Vec<f64>,
-    form: Vec<f64>,
-    gradient: Vec<f64>,
-    hessian: Vec<f64>,
-    factor: Vec<f64>,
-    step: Vec<f64>,
-    trial: Vec<f64>,
-}
-
-#[inline(always)]
-fn grow(buffer: &mut Vec<f64>, len: usize) -> &mut [f64] {
-    if buffer.len() < len {
-        buffer.resize(len, 0.0);
-    }
-    &mut buffer[..len]
-}
-
-#[inline(always)]
-fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
-}
-
+const FALLING: f64 = 0.1;
 /// Damping tried per iteration before giving up; each raises μ fourfold.
-const DAMPINGS: usize = 80;
+const DAMPINGS: f64 = 80.0;
 /// First damping, relative to the largest diagonal entry of the Hessian.
 const FIRST_DAMPING: f64 = 1e-3;
 
-/// Descends from `g` along `variables`, leaving the end point in `g`.
-#[inline(always)]
-pub(super) fn minimise<O: Objective>(
-    objective: &mut O,
-    g: &mut [f64],
-    variables: &[Variable],
-    limits: Limits,
-    rival: Option<Rival>,
-    w: &mut Workspace,
-) -> Reached {
-    let (d, width) = (variables.len(), objective.width());
-    let full = grow(&mut w.full, width);
-    let form = grow(&mut w.form, width * width);
-    let gradient = grow(&mut w.gradient, d);
-    let hessian = grow(&mut w.hessian, d * d);
-    let factor = grow(&mut w.factor, d * d);
-    let step = grow(&mut w.step, d);
-    let trial = grow(&mut w.trial, width);
+/// Scratch that is reused from solve to solve.
+#[derive(Debug)]
+pub(super) struct Workspace<T: Number> {
+    pub(super) layout: Layout<T>,
+    pub(super) g: Vec<T>,
+    slope: Vec<T>,
+    trial: Vec<T>,
+    trial_slope: Vec<T>,
+    rival: Vec<T>,
+    pub(super) form: Vec<T>,
+    pub(super) hessian: Vec<T>,
+    pub(super) factor: Vec<T>,
+    gradient: Vec<T>,
+    step: Vec<T>,
+    other: Vec<T>,
+}
 
-    let mut value = objective.value(g);
-    let noise_scale = objective.value_scale();
-    let mut damping = 0.0;
-    objective.gradient(g, full);
-    restrict(full, variables, gradient);
-    let mut slope = super::objective::norm(gradient);
-    let mut iterations = 0;
-    // Whether the last step kept its promise, and what it promised.
-    let (mut trusted, mut expected) = (false, 0.0);
+impl<T: Number> Default for Workspace<T> {
+    fn default() -> Self {
+        let empty = Vec::new;
+        Self {
+            layout: Layout::default(),
+            g: empty(),
+            slope: empty(),
+            trial: empty(),
+            trial_slope: empty(),
+            rival: empty(),
+            form: empty(),
+            hessian: empty(),
+            factor: empty(),
+            gradient: empty(),
+            step: empty(),
+            other: empty(),
+        }
+    }
+}
+
+impl<T: Number> Workspace<T> {
+    /// Makes room for gains of `width` entries.
+    #[inline(always)]
+    pub(super) fn grow(&mut self, width: usize) {
+        let vectors = [
+            &mut self.g,
+            &mut self.slope,
+            &mut self.trial,
+            &mut self.trial_slope,
+            &mut self.rival,
+            &mut self.gradient,
+            &mut self.step,
+            &mut self.other,
+        ];
+        for vector in vectors {
+            if vector.len() < width {
+                vector.resize(width, T::splat(0.0));
+            }
+        }
+        for matrix in [&mut self.form, &mut self.hessian, &mut self.factor] {
+            if matrix.len() < width * width {
+                matrix.resize(width * width, T::splat(0.0));
+            }
+        }
+    }
+}
+
+/// First damping after a step that did not pay, relative likewise.
+const FIRST_REJECTED: f64 = 1e-2;
+/// Length aimed at where a step was too long, relative to the longest, and the least by which μ is then raised.
+const AIM: f64 = 0.8;
+const LEAST_RAISE: f64 = 1.25;
+
+/// What each lane knows of its descent.
+struct State<T> {
+    value: T,
+    slope: T,
+    scale: T,
+    damping: T,
+    iterations: T,
+    /// Damping tried in this iteration.
+    dampings: T,
+    /// What the last step promised.
+    expected: T,
+    rival: T,
+    near: T,
+}
+
+/// Descends from every point of `tasks` along the variables of its owner, and leaves each end point in its place.
+#[inline(always)]
+pub(super) fn minimise<T: Number, O: Objective<T>>(
+    objective: &mut O,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    library: bool,
+    w: &mut Workspace<T>,
+) {
+    let width = objective.width();
+    w.grow(width);
+    let Workspace { layout, g, slope: full, trial, trial_slope, rival, form, hessian, factor, gradient, step, other } =
+        w;
+    let (g, full, trial, trial_slope, rival) =
+        (&mut g[..width], &mut full[..width], &mut trial[..width], &mut trial_slope[..width], &mut rival[..width]);
+    let (zero, noise_scale) = (T::splat(0.0), T::splat(objective.value_scale()));
+    let mut s = State {
+        value: zero,
+        slope: zero,
+        scale: zero,
+        damping: zero,
+        iterations: zero,
+        dampings: zero,
+        expected: zero,
+        rival: zero,
+        near: zero,
+    };
+    let mut lanes: [&[Variable]; 8] = [&[]; 8];
+    let mut task = [0; 8];
+    let (mut next, mut largest, mut stale) = (0, zero, true);
+    // Lanes that work; that have a new point, not yet evaluated; whose last step kept its promise; that have a rival.
+    let (mut busy, mut fresh, mut trusted, mut rivals) = (0u8, 0u8, 0u8, 0u8);
     loop {
-        let scale = objective.gradient_scale(g);
-        if slope <= limits.tolerance * scale || iterations == limits.iterations {
-            return limits.end(value, slope, scale, iterations, iterations == limits.iterations);
-        }
-        if let Some(rival) = rival
-            && value >= rival.value
-            && squared_distance(g, rival.g) <= rival.near * rival.near
-        {
-            return limits.end(value, slope, scale, iterations, false);
-        }
-        iterations += 1;
-        objective.hessian(g, form);
-        restrict_form(form, width, variables, hessian, d);
-        let largest = (0..d).fold(0.0, |m: f64, i| m.max(hessian[i * d + i].abs()));
-        let noise = 1e-15 * (value + (value * noise_scale).sqrt());
-        let mut accepted = false;
-        for _ in 0..DAMPINGS {
-            factor.copy_from_slice(hessian);
-            for i in 0..d {
-                factor[i * d + i] += damping;
-            }
-            let raise = (4.0 * damping).max(FIRST_DAMPING * largest).max(f64::MIN_POSITIVE);
-            if !dense::factorise(factor, d) {
-                damping = raise;
+        let mut changed = false;
+        for lane in 0..T::LANES {
+            if busy >> lane & 1 == 1 || next == tasks.len() {
                 continue;
             }
-            for (s, g) in step.iter_mut().zip(gradient.iter()) {
-                *s = -g;
+            let (owner, bit) = (&owners[tasks.owner(next)], 1 << lane);
+            for (g, &x) in g.iter_mut().zip(tasks.point(next)) {
+                g.set_lane(lane, x);
             }
-            dense::solve(factor, d, step);
-            let length2: f64 = step.iter().map(|s| s * s).sum();
-            if length2 > limits.longest * limits.longest {
-                damping = raise;
-                continue;
-            }
-            let inner: f64 = step.iter().zip(gradient.iter()).map(|(s, g)| s * g).sum();
-            let predicted = -0.5 * (inner - damping * length2);
-            if let Some(rival) = rival
-                && trusted
-                && damping == 0.0
-                && predicted < FALLING * expected
-                && value - REST * predicted > rival.value
-            {
-                return limits.end(value, slope, scale, iterations, false);
-            }
-            trial.copy_from_slice(g);
-            advance(trial, variables, step);
-            let next = objective.value(trial);
-            let actual = value - next;
-            let paid = actual > 1e-4 * predicted;
-            if paid || predicted <= noise {
-                objective.gradient(trial, full);
-                restrict(full, variables, step);
-                let next_slope = super::objective::norm(step);
-                if paid || next_slope < slope && actual >= -noise {
-                    gradient.copy_from_slice(step);
-                    g.copy_from_slice(trial);
-                    if actual > 0.75 * predicted {
-                        damping *= 0.125;
-                        if damping < FIRST_DAMPING * FIRST_DAMPING * largest {
-                            damping = 0.0;
-                        }
-                    }
-                    trusted = damping == 0.0 && (actual - predicted).abs() <= 0.25 * predicted;
-                    expected = predicted;
-                    (value, slope, accepted) = (next, next_slope, true);
-                    break;
+            let (complex, scale) = tasks.kind(next);
+            objective.set_lane(lane, complex, scale);
+            rivals &= !bit;
+            if let Some(known) = owner.rival {
+                rivals |= bit;
+                for (rival, &x) in rival.iter_mut().zip(known.g) {
+                    rival.set_lane(lane, x);
                 }
-                if predicted <= noise {
-                    break;
-                }
+                s.rival.set_lane(lane, known.value);
+                s.near.set_lane(lane, known.near * known.near);
             }
-            damping = raise;
+            s.damping.set_lane(lane, 0.0);
+            s.iterations.set_lane(lane, 0.0);
+            (busy, fresh, trusted) = (busy | bit, fresh | bit, trusted & !bit);
+            (lanes[lane], task[lane]) = (owner.variables, next);
+            (next, changed) = (next + 1, true);
         }
-        if !accepted {
-            value = objective.value(g);
-            let scale = objective.gradient_scale(g);
-            return limits.end(value, slope, scale, iterations, false);
+        if busy == 0 {
+            return;
+        }
+        if changed {
+            layout.list(lanes, tasks.width(), width / tasks.width());
+            stale = true;
+        }
+        let d = layout.len();
+        let (gradient, step, w_step) = (&mut gradient[..d], &mut step[..d], &mut other[..d]);
+        let (hessian, factor) = (&mut hessian[..d * d], &mut factor[..d * d]);
+        let old = busy & !fresh;
+        let (mut moved, mut failed, mut ended) = (0, 0, 0);
+        let (mut noise, mut predicted, mut raise) = (zero, zero, zero);
+        if old != 0 {
+            if stale {
+                objective.hessian(g, form);
+                layout.restrict_form(form, width, hessian);
+                layout.restrict(full, gradient);
+                largest = layout.largest(hessian);
+                stale = false;
+            }
+            noise = T::splat(1e-15) * (s.value + (s.value * noise_scale).sqrt());
+            for (w, &g) in w_step.iter_mut().zip(gradient.iter()) {
+                *w = zero - g;
+            }
+            raise = (T::splat(4.0) * s.damping)
+                .or_larger(T::splat(FIRST_DAMPING) * largest)
+                .or_larger(T::splat(f64::MIN_POSITIVE));
+            let (definite, lack) = dense::factorise(hessian, s.damping, layout, library, w_step, step, factor);
+            let definite = T::bits(definite) & old;
+            failed = old & !definite;
+            // An indefinite matrix lacks about what its pivot did.
+            let lack = s.damping + T::select(lack.less(largest), lack, largest);
+            raise = T::select(T::mask(definite), raise, raise.or_larger(lack));
+            if definite != 0 {
+                dense::back(factor, d, step);
+                let length2 = sum_of_squares(step);
+                let short = T::bits(length2.at_most(T::splat(limits.longest * limits.longest)));
+                let long = definite & !short;
+                if long != 0 {
+                    // Moré and Sorensen's step towards the μ at which the length is right: Newton on its reciprocal.
+                    w_step.copy_from_slice(step);
+                    dense::forward(factor, d, library, w_step);
+                    let length = length2.sqrt();
+                    let excess = length * T::splat(1.0 / (AIM * limits.longest)) - T::splat(1.0);
+                    let better = s.damping + length2 / sum_of_squares(w_step) * excess;
+                    let least = (T::splat(LEAST_RAISE) * s.damping)
+                        .or_larger(T::splat(FIRST_DAMPING * FIRST_DAMPING) * largest)
+                        .or_larger(T::splat(f64::MIN_POSITIVE));
+                    raise = T::select(T::mask(long), least.or_larger(better), raise);
+                }
+                failed |= long;
+                predicted = T::splat(-0.5) * (dot(step, gradient) - s.damping * length2);
+                let rest = s.value - T::splat(REST) * predicted;
+                let hopeless = T::bits(s.damping.at_most(zero))
+                    & T::bits(predicted.less(T::splat(FALLING) * s.expected))
+                    & T::bits(s.rival.less(rest));
+                ended = definite & short & rivals & trusted & hopeless;
+                moved = definite & short & !ended;
+            }
+        }
+        trial.copy_from_slice(g);
+        if moved != 0 {
+            if T::LANES > 1 {
+                let mask = T::mask(moved);
+                for s in step.iter_mut() {
+                    *s = T::select(mask, *s, zero);
+                }
+            }
+            layout.advance(trial, step);
+        }
+        if moved | fresh != 0 {
+            let value = objective.value(trial);
+            objective.gradient(trial, trial_slope);
+            layout.restrict(trial_slope, step);
+            let slope = norm(step);
+            let actual = s.value - value;
+            let paid = T::bits((T::splat(1e-4) * predicted).less(actual));
+            let small = T::bits(predicted.at_most(noise));
+            let flatter = T::bits(slope.less(s.slope)) & T::bits((zero - noise).at_most(actual));
+            let accepted = moved & (paid | small & flatter);
+            ended |= moved & !accepted & small;
+            failed |= moved & !accepted & !small;
+
+            let mut damping = s.damping * T::splat(0.125);
+            damping = T::select(damping.less(T::splat(FIRST_DAMPING * FIRST_DAMPING) * largest), zero, damping);
+            let good = accepted & T::bits((T::splat(0.75) * predicted).less(actual));
+            s.damping = T::select(T::mask(good), damping, s.damping);
+            let kept = T::bits((actual - predicted).abs().at_most(T::splat(0.25) * predicted))
+                & T::bits(s.damping.at_most(zero));
+            trusted = trusted & !accepted | accepted & kept;
+            s.expected = T::select(T::mask(accepted), predicted, s.expected);
+
+            let taken = accepted | fresh;
+            if taken != 0 {
+                let mask = T::mask(taken);
+                for (g, &x) in g.iter_mut().zip(trial.iter()) {
+                    *g = T::select(mask, x, *g);
+                }
+                for (f, &x) in full.iter_mut().zip(trial_slope.iter()) {
+                    *f = T::select(mask, x, *f);
+                }
+                objective.keep(mask);
+                s.value = T::select(mask, value, s.value);
+                s.slope = T::select(mask, slope, s.slope);
+                s.scale = T::select(mask, objective.gradient_scale(trial), s.scale);
+                let mut distance = zero;
+                for (&a, &b) in g.iter().zip(rival.iter()) {
+                    distance = distance + (a - b) * (a - b);
+                }
+                let back = T::bits(s.rival.at_most(s.value)) & T::bits(distance.at_most(s.near));
+                let flat = T::bits(s.slope.at_most(T::splat(limits.tolerance) * s.scale));
+                let spent = T::bits(T::splat(limits.iterations as f64).at_most(s.iterations));
+                ended |= taken & (flat | spent | rivals & back);
+                let going = T::mask(taken & !ended);
+                s.iterations = T::select(going, s.iterations + T::splat(1.0), s.iterations);
+                s.dampings = T::select(going, zero, s.dampings);
+                stale = true;
+            }
+        }
+        if failed != 0 {
+            let mask = T::mask(failed);
+            let rejected = T::mask(moved & failed);
+            raise =
+                T::select(rejected, (T::splat(8.0) * s.damping).or_larger(T::splat(FIRST_REJECTED) * largest), raise);
+            s.damping = T::select(mask, raise, s.damping);
+            s.dampings = T::select(mask, s.dampings + T::splat(1.0), s.dampings);
+            ended |= failed & T::bits(T::splat(DAMPINGS).at_most(s.dampings));
+        }
+        fresh = 0;
+        busy &= !ended;
+        while ended != 0 {
+            let lane = ended.trailing_zeros() as usize;
+            ended &= ended - 1;
+            for (x, g) in tasks.point_mut(task[lane]).iter_mut().zip(g.iter()) {
+                *x = g.lane(lane);
+            }
+            lanes[lane] = &[];
+            let (iterations, scale) = (s.iterations.lane(lane) as usize, s.scale.lane(lane));
+            let reached = Reached::new(s.value.lane(lane), s.slope.lane(lane), scale, iterations, &limits);
+            tasks.end(task[lane], reached);
         }
     }
 }

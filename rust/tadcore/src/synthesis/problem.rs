@@ -12,6 +12,7 @@
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
 use crate::game::{Game, Interaction};
+use crate::lanes::{norm, sum_of_squares};
 
 /// Everything Θ needs to know of one instant t_k.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +32,22 @@ pub struct Problem {
     /// The Hessian's constant part 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** with + and with −, mN × mN;
     /// blocks on and below the diagonal.
     pub(super) quadratic: [Vec<f64>; 2],
+    pub(super) scale: Scale,
+}
+
+/// Norms that say how large the cancelling parts of Θ and its gradient are.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scale {
+    /// ‖F‖.
+    pub fne: f64,
+    /// ‖M‖.
+    pub target: f64,
+    /// Σ_p ‖W_p‖².
+    pub coupling: f64,
+    /// The largest c_i.
+    pub closeness: f64,
+    /// The largest r_i.
+    pub weight: f64,
 }
 
 impl Problem {
@@ -89,7 +106,21 @@ impl Problem {
             })
             .collect();
         let quadratic = [1.0, -1.0].map(|sign| constant(size, sign, &coupling, &coupling_gram, &closeness));
-        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness, quadratic }
+        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let scale = Scale {
+            fne: norm(&fne),
+            target: norm(&target),
+            coupling: coupling.iter().map(|w| sum_of_squares(w)).sum(),
+            closeness: largest(&closeness),
+            weight: largest(&r),
+        };
+        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness, quadratic, scale }
+    }
+
+    /// Size of the parts of Θ: what its rounding is relative to.
+    pub(super) fn value_scale(&self) -> f64 {
+        let s = &self.scale;
+        self.gamma[0] * s.target * s.target + (4.0 * s.coupling + s.closeness) * s.fne * s.fne
     }
 
     /// N.

@@ -1,0 +1,226 @@
+//! Runs a list of descents as wide as the processor and the list allow: one at a time, or four or eight side by side.
+//!
+//! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
+//! leave the first cache side by side, and go one at a time.
+
+use super::dense;
+use super::doubled::Doubled;
+use super::newton::{Objective, Workspace, minimise};
+use super::objective::RealGains;
+use super::problem::Problem;
+use super::start::Variable;
+use super::tasks::{Limits, Owner, Tasks};
+use crate::lanes::Number;
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{Eight, Four, Wide};
+use crate::width::Width;
+
+/// N up to which there is a version with constant loop bounds.
+pub(super) const CONSTANT_UP_TO: usize = 8;
+/// N up to which descents go side by side.
+pub(crate) const SIDE_BY_SIDE_UP_TO: usize = 6;
+/// Descents from which they go side by side.
+const SIDE_BY_SIDE_FROM: usize = 2;
+/// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
+const CERTIFICATE_ROUNDING: f64 = 1e-12;
+
+/// In which gains a list descends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// In the gains themselves.
+    Real,
+    /// In the gains themselves; each end point is then tried for the certificate.
+    Certified,
+    /// In twice as many, complex or stacked.
+    Doubled,
+}
+
+/// The scratch of the widths in use.
+#[derive(Debug)]
+pub(super) struct Engine {
+    width: Width,
+    one: Workspace<f64>,
+    #[cfg(target_arch = "x86_64")]
+    wide: Workspace<Wide<1>>,
+    #[cfg(target_arch = "x86_64")]
+    four: Workspace<Four>,
+    #[cfg(target_arch = "x86_64")]
+    eight: Workspace<Eight>,
+}
+
+impl Default for Engine {
+    fn default() -> Self {
+        Self::of(Width::detect())
+    }
+}
+
+impl Engine {
+    /// An engine of a width that the processor has.
+    pub(super) fn of(width: Width) -> Self {
+        Self {
+            width,
+            one: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            wide: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            four: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            eight: Workspace::default(),
+        }
+    }
+
+    /// Makes the descents of `tasks`.
+    pub(super) fn run<const N: usize>(
+        &mut self,
+        kind: Kind,
+        problem: &Problem,
+        tasks: &mut Tasks,
+        owners: &[Owner],
+        limits: Limits,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if const { 0 < N && N <= SIDE_BY_SIDE_UP_TO } && tasks.len() >= SIDE_BY_SIDE_FROM {
+            match self.width {
+                Width::Baseline => {}
+                Width::Avx2 => {
+                    debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
+                    // SAFETY: this variant exists only where the processor said that it has AVX2.
+                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, &mut self.wide) };
+                }
+                Width::Avx512 => {
+                    debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
+                    // SAFETY: this variant exists only where the processor said that it has AVX-512F and VL.
+                    return unsafe {
+                        if kind == Kind::Doubled {
+                            run_avx512_doubled::<N>(problem, tasks, owners, limits, &mut self.four)
+                        } else {
+                            run_avx512_real::<N>(kind, problem, tasks, owners, limits, &mut self.eight)
+                        }
+                    };
+                }
+            }
+        }
+        // Every width gives the same bits; where the processor has only the target's, one version for all sizes will do.
+        #[cfg(target_arch = "x86_64")]
+        if self.width == Width::Baseline {
+            return run::<f64, 0>(kind, problem, tasks, owners, limits, &mut self.one);
+        }
+        debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
+        // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2.
+        unsafe { run_one::<N>(kind, problem, tasks, owners, limits, &mut self.one) }
+    }
+}
+
+/// One descent after another.
+///
+/// # Safety
+/// On x86-64 the processor must have AVX2.
+#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2"))]
+unsafe fn run_one<const N: usize>(
+    kind: Kind,
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<f64>,
+) {
+    run::<f64, N>(kind, problem, tasks, owners, limits, w);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_avx2<const N: usize>(
+    kind: Kind,
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<Wide<1>>,
+) {
+    run::<Wide<1>, N>(kind, problem, tasks, owners, limits, w);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl")]
+fn run_avx512_real<const N: usize>(
+    kind: Kind,
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<Eight>,
+) {
+    let kind = if kind == Kind::Certified { Kind::Certified } else { Kind::Real };
+    run::<Eight, N>(kind, problem, tasks, owners, limits, w);
+}
+
+/// Four at a time: the Hessian of eight would not stay in the first cache.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl")]
+fn run_avx512_doubled<const N: usize>(
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<Four>,
+) {
+    run::<Four, N>(Kind::Doubled, problem, tasks, owners, limits, w);
+}
+
+#[inline(always)]
+fn run<T: Number, const N: usize>(
+    kind: Kind,
+    problem: &Problem,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    limits: Limits,
+    w: &mut Workspace<T>,
+) {
+    if kind == Kind::Doubled {
+        minimise(&mut Doubled::<T, N>::new(problem), tasks, owners, limits, problem.size > CONSTANT_UP_TO, w);
+        return;
+    }
+    let mut real = RealGains::<T, N>::new(problem);
+    minimise(&mut real, tasks, owners, limits, problem.size > CONSTANT_UP_TO, w);
+    if kind == Kind::Certified {
+        certify(&mut real, tasks, owners, problem.size > CONSTANT_UP_TO, w);
+    }
+}
+
+/// Tries every end point for the certificate that proves a critical point to be a global minimiser.
+#[inline(always)]
+fn certify<T: Number, const N: usize>(
+    real: &mut RealGains<T, N>,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    library: bool,
+    w: &mut Workspace<T>,
+) {
+    let width = real.width();
+    let mut first = 0;
+    while first < tasks.len() {
+        let last = tasks.len().min(first + T::LANES);
+        let mut lanes: [&[Variable]; 8] = [&[]; 8];
+        for task in first..last {
+            let lane = task - first;
+            lanes[lane] = owners[tasks.owner(task)].variables;
+            for (g, &x) in w.g.iter_mut().zip(tasks.point(task)) {
+                g.set_lane(lane, x);
+            }
+        }
+        w.layout.list(lanes, width, 1);
+        real.value(&w.g[..width]);
+        real.certificate_form(&mut w.form);
+        w.layout.restrict_form(&mut w.form, width, &mut w.hessian);
+        let largest = w.layout.largest(&w.hessian);
+        let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
+        let (definite, _) = dense::factorise(&w.hessian, allowance, &w.layout, library, &[], &mut [], &mut w.factor);
+        let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
+        for task in first..last {
+            if proved >> (task - first) & 1 == 1 {
+                tasks.certify(task);
+            }
+        }
+        first = last;
+    }
+}
