@@ -1,7 +1,7 @@
 //! Numbers side by side: one, or four in each vector register.
 //!
-//! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the plain IEEE
-//! one on each lane and none is fused with another, so a lane gives the bits that the number alone would give. The methods of the wide types are inlined into functions that are compiled for their instructions; a closure
+//! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the IEEE one on
+//! each lane, the fused ones too, so a lane gives the bits that the number alone would give. The methods of the wide types are inlined into functions that are compiled for their instructions; a closure
 //! is a function of its own and is not, so kernels over `Number` are plain loops.
 
 use std::ops::{Add, Div, Mul, Sub};
@@ -24,6 +24,10 @@ pub(crate) trait Number:
     fn lane(&self, lane: usize) -> f64;
     /// Replaces the number in one lane.
     fn set_lane(&mut self, lane: usize, x: f64);
+    /// self + x·y, rounded once.
+    fn plus(self, x: Self, y: Self) -> Self;
+    /// self − x·y, rounded once.
+    fn minus(self, x: Self, y: Self) -> Self;
     fn sqrt(self) -> Self;
     fn abs(self) -> Self;
     /// Where a < b; no where one is no number.
@@ -68,14 +72,14 @@ pub(crate) fn dot<T: Number>(x: &[T], y: &[T]) -> T {
     let y = &y[..len];
     let mut i = 0;
     while i + 4 <= len {
-        s0 = s0 + x[i] * y[i];
-        s1 = s1 + x[i + 1] * y[i + 1];
-        s2 = s2 + x[i + 2] * y[i + 2];
-        s3 = s3 + x[i + 3] * y[i + 3];
+        s0 = s0.plus(x[i], y[i]);
+        s1 = s1.plus(x[i + 1], y[i + 1]);
+        s2 = s2.plus(x[i + 2], y[i + 2]);
+        s3 = s3.plus(x[i + 3], y[i + 3]);
         i += 4;
     }
     while i < len {
-        s0 = s0 + x[i] * y[i];
+        s0 = s0.plus(x[i], y[i]);
         i += 1;
     }
     (s0 + s1) + (s2 + s3)
@@ -96,6 +100,14 @@ impl Number for f64 {
     #[inline(always)]
     fn set_lane(&mut self, _lane: usize, x: f64) {
         *self = x;
+    }
+    #[inline(always)]
+    fn plus(self, x: f64, y: f64) -> f64 {
+        x.mul_add(y, self)
+    }
+    #[inline(always)]
+    fn minus(self, x: f64, y: f64) -> f64 {
+        (-x).mul_add(y, self)
     }
     #[inline(always)]
     fn sqrt(self) -> f64 {
@@ -182,6 +194,22 @@ mod x86 {
             *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
         }
         #[inline(always)]
+        fn plus(mut self, x: Self, y: Self) -> Self {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+                self.0[r] = unsafe { _mm256_fmadd_pd(x.0[r], y.0[r], self.0[r]) };
+            }
+            self
+        }
+        #[inline(always)]
+        fn minus(mut self, x: Self, y: Self) -> Self {
+            for r in 0..R {
+                // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+                self.0[r] = unsafe { _mm256_fnmadd_pd(x.0[r], y.0[r], self.0[r]) };
+            }
+            self
+        }
+        #[inline(always)]
         fn sqrt(mut self) -> Self {
             for r in 0..R {
                 // SAFETY: the caller is compiled for AVX2; registers alone.
@@ -247,7 +275,7 @@ mod x86 {
     /// AVX-512: one register and its masks.
     macro_rules! masked {
         ($(#[$doc:meta])* $type:ident $register:ident $lanes:literal: $add:ident $sub:ident $mul:ident $div:ident
-         $sqrt:ident $abs:ident $set:ident $store:ident $compare:ident $blend:ident) => {
+         $plus:ident $minus:ident $sqrt:ident $abs:ident $set:ident $store:ident $compare:ident $blend:ident) => {
             $(#[$doc])*
             #[derive(Debug, Clone, Copy)]
             pub(crate) struct $type($register);
@@ -273,6 +301,16 @@ mod x86 {
                 #[inline(always)]
                 fn set_lane(&mut self, lane: usize, x: f64) {
                     *self = Self::select(1 << lane, Self::splat(x), *self);
+                }
+                #[inline(always)]
+                fn plus(self, x: Self, y: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($plus(x.0, y.0, self.0)) }
+                }
+                #[inline(always)]
+                fn minus(self, x: Self, y: Self) -> Self {
+                    // SAFETY: the caller is compiled for AVX-512; registers alone.
+                    unsafe { Self($minus(x.0, y.0, self.0)) }
                 }
                 #[inline(always)]
                 fn sqrt(self) -> Self {
@@ -324,13 +362,13 @@ mod x86 {
     masked!(
         /// AVX-512: eight numbers in a register.
         Eight __m512d 8: _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
-        _mm512_sqrt_pd _mm512_abs_pd _mm512_set1_pd _mm512_storeu_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
+        _mm512_fmadd_pd _mm512_fnmadd_pd _mm512_sqrt_pd _mm512_abs_pd _mm512_set1_pd _mm512_storeu_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
     );
 
     masked!(
         /// AVX-512VL: four numbers in half a register.
         Four __m256d 4: _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
-        _mm256_sqrt_pd absolute _mm256_set1_pd _mm256_storeu_pd _mm256_cmp_pd_mask _mm256_mask_blend_pd
+        _mm256_fmadd_pd _mm256_fnmadd_pd _mm256_sqrt_pd absolute _mm256_set1_pd _mm256_storeu_pd _mm256_cmp_pd_mask _mm256_mask_blend_pd
     );
 
     #[inline(always)]

@@ -84,7 +84,7 @@ fn by_columns<T: Number, const SIZE: usize>(a: &mut [T], d: usize) -> (T::Mask, 
         for i in k + 1..d {
             let factor = column[i];
             for (x, &c) in a[i * d + k + 1..i * d + i + 1].iter_mut().zip(&column[k + 1..i + 1]) {
-                *x = *x - factor * c;
+                *x = x.minus(factor, c);
             }
         }
     }
@@ -103,7 +103,7 @@ fn by_rows<T: Number>(h: &[T], damping: T, layout: &Layout<T>, l: &mut [T]) -> (
         let original = h[i * d + i] + damping;
         let mut pivot = original;
         for &x in &row[..i] {
-            pivot = pivot - x * x;
+            pivot = pivot.minus(x, x);
         }
         let active = T::bits(layout.active(i));
         let sound = sound(pivot, original);
@@ -134,15 +134,15 @@ fn eliminate<T: Number>(above: &[T], d: usize, x: &[T], row: &mut [T]) {
         let (s0, s1, s2, s3) = (&r0[..j], &r1[..j], &r2[..j], &r3[..j]);
         for k in 0..j {
             let f = done[k];
-            x0 = x0 - f * s0[k];
-            x1 = x1 - f * s1[k];
-            x2 = x2 - f * s2[k];
-            x3 = x3 - f * s3[k];
+            x0 = x0.minus(f, s0[k]);
+            x1 = x1.minus(f, s1[k]);
+            x2 = x2.minus(f, s2[k]);
+            x3 = x3.minus(f, s3[k]);
         }
         x0 = x0 * r0[j];
-        x1 = (x1 - x0 * r1[j]) * r1[j + 1];
-        x2 = (x2 - x0 * r2[j] - x1 * r2[j + 1]) * r2[j + 2];
-        x3 = (x3 - x0 * r3[j] - x1 * r3[j + 1] - x2 * r3[j + 2]) * r3[j + 3];
+        x1 = x1.minus(x0, r1[j]) * r1[j + 1];
+        x2 = x2.minus(x0, r2[j]).minus(x1, r2[j + 1]) * r2[j + 2];
+        x3 = x3.minus(x0, r3[j]).minus(x1, r3[j + 1]).minus(x2, r3[j + 2]) * r3[j + 3];
         (rest[0], rest[1], rest[2], rest[3]) = (x0, x1, x2, x3);
         j += 4;
     }
@@ -151,7 +151,7 @@ fn eliminate<T: Number>(above: &[T], d: usize, x: &[T], row: &mut [T]) {
         let (done, rest) = row.split_at_mut(j);
         let mut y = x[j];
         for (&a, &b) in done.iter().zip(r) {
-            y = y - a * b;
+            y = y.minus(a, b);
         }
         rest[0] = y * r[j];
         j += 1;
@@ -194,7 +194,7 @@ pub(super) fn forward<T: Number>(l: &[T], d: usize, library: bool, x: &mut [T]) 
             let row = &l[i * d..i * d + i + 1];
             let mut sum = x[i];
             for (&a, &b) in row[..i].iter().zip(&x[..i]) {
-                sum = sum - a * b;
+                sum = sum.minus(a, b);
             }
             x[i] = sum * row[i];
         }
@@ -204,7 +204,7 @@ pub(super) fn forward<T: Number>(l: &[T], d: usize, library: bool, x: &mut [T]) 
             let value = x[j] * l[j * d + j];
             x[j] = value;
             for i in j + 1..d {
-                x[i] = x[i] - l[i * d + j] * value;
+                x[i] = x[i].minus(l[i * d + j], value);
             }
         }
     }
@@ -218,7 +218,7 @@ pub(super) fn back<T: Number>(l: &[T], d: usize, x: &mut [T]) {
         let value = x[i] * row[i];
         x[i] = value;
         for (&a, b) in row[..i].iter().zip(&mut x[..i]) {
-            *b = *b - a * value;
+            *b = b.minus(a, value);
         }
     }
 }

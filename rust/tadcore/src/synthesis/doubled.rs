@@ -97,15 +97,15 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             for a in 0..n {
                 let (fa, fb) = (r * ai[a], r * bi[a]);
                 for b in 0..n {
-                    real[a * n + b] = real[a * n + b] + (fa * ai[b] + fb * bi[b]);
-                    imaginary[a * n + b] = imaginary[a * n + b] + (fa * bi[b] - fb * ai[b]);
+                    real[a * n + b] = real[a * n + b].plus(fa, ai[b]).plus(fb, bi[b]);
+                    imaginary[a * n + b] = imaginary[a * n + b].plus(fa, bi[b]).minus(fb, ai[b]);
                 }
             }
             let di = &mut delta[i * n..(i + 1) * n];
             for a in 0..n {
                 di[a] = ai[a] - T::splat(p.fne[i * n + a]);
             }
-            rest = rest + T::splat(p.closeness[i]) * (sum_of_squares(di) + sum_of_squares(bi));
+            rest = rest.plus(T::splat(p.closeness[i]), sum_of_squares(di) + sum_of_squares(bi));
         }
         for x in imaginary.iter_mut() {
             *x = self.complex * *x;
@@ -119,7 +119,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             symmetric_product(e, n, m, &w[..m * n], ib, self.sign);
             rest = rest + sum_of_squares(e);
         }
-        T::splat(p.gamma[0]) * (sum_of_squares(real) + sum_of_squares(imaginary)) + rest
+        rest.plus(T::splat(p.gamma[0]), sum_of_squares(real) + sum_of_squares(imaginary))
     }
 
     #[inline(always)]
@@ -187,13 +187,13 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
                         let (sa, sb) = (s * fa, s * fb);
                         let h = &mut upper[row + column..][..n];
                         for b in 0..n {
-                            h[b] = T::splat(plus[b]) + (fa * ai[b] - sb * bi[b]);
+                            h[b] = T::splat(plus[b]).plus(fa, ai[b]).minus(sb, bi[b]);
                         }
                         h[a] = h[a] + of_a;
                         let h = &mut lower[row + half + column..][..n];
                         for b in 0..n {
                             let q = T::select(stacked, T::splat(plus[b]), T::splat(minus[b]));
-                            h[b] = q + (fb * bi[b] - sa * ai[b]);
+                            h[b] = q.plus(fb, bi[b]).minus(sa, ai[b]);
                         }
                         h[a] = h[a] + of_b;
                     }
@@ -203,7 +203,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
                     let (fa, sb) = (f * aj[a], s * (f * bj[a]));
                     let h = &mut lower[(i * n + a) * width + j * n..][..n];
                     for b in 0..n {
-                        h[b] = fa * bi[b] + sb * ai[b];
+                        h[b] = (fa * bi[b]).plus(sb, ai[b]);
                     }
                     h[a] = h[a] + cross;
                 }
@@ -212,11 +212,10 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             for a in 0..n {
                 let (row, column) = ((i * n + a) * width, i * n);
                 for b in 0..n {
-                    let (r, i) = (own * real[a * n + b], own * imaginary[a * n + b]);
-                    let at = row + column + b;
-                    upper[at] = upper[at] + r;
-                    lower[at + half] = lower[at + half] + r;
-                    lower[at] = lower[at] - i;
+                    let (r, i, at) = (real[a * n + b], imaginary[a * n + b], row + column + b);
+                    upper[at] = upper[at].plus(own, r);
+                    lower[at + half] = lower[at + half].plus(own, r);
+                    lower[at] = lower[at].minus(own, i);
                 }
             }
         }

@@ -115,7 +115,7 @@ impl Engine {
 ///
 /// # Safety
 /// On x86-64 the processor must have AVX2.
-#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2"))]
+#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
 unsafe fn run_one<const N: usize>(
     kind: Kind,
     problem: &Problem,
@@ -128,7 +128,7 @@ unsafe fn run_one<const N: usize>(
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn run_avx2<const N: usize>(
     kind: Kind,
     problem: &Problem,
@@ -141,7 +141,7 @@ fn run_avx2<const N: usize>(
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl")]
+#[target_feature(enable = "avx512f,avx512vl,fma")]
 fn run_avx512_real<const N: usize>(
     kind: Kind,
     problem: &Problem,
@@ -156,7 +156,7 @@ fn run_avx512_real<const N: usize>(
 
 /// Four at a time: the Hessian of eight would not stay in the first cache.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl")]
+#[target_feature(enable = "avx512f,avx512vl,fma")]
 fn run_avx512_doubled<const N: usize>(
     problem: &Problem,
     tasks: &mut Tasks,

@@ -296,7 +296,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 s.scale = T::select(mask, objective.gradient_scale(trial), s.scale);
                 let mut distance = zero;
                 for (&a, &b) in g.iter().zip(rival.iter()) {
-                    distance = distance + (a - b) * (a - b);
+                    distance = distance.plus(a - b, a - b);
                 }
                 let back = T::bits(s.rival.at_most(s.value)) & T::bits(distance.at_most(s.near));
                 let flat = T::bits(s.slope.at_most(T::splat(limits.tolerance) * s.scale));

@@ -61,7 +61,7 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
             for a in 0..n {
                 let row = &mut out[(i * n + a) * width + i * n..][..n];
                 for (h, &x) in row.iter_mut().zip(&self.x[a * n..(a + 1) * n]) {
-                    *h = *h + factor * x;
+                    *h = h.plus(factor, x);
                 }
             }
         }
@@ -91,14 +91,14 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             for a in 0..n {
                 let factor = r * gi[a];
                 for b in 0..n {
-                    x[a * n + b] = x[a * n + b] + factor * gi[b];
+                    x[a * n + b] = x[a * n + b].plus(factor, gi[b]);
                 }
             }
             let di = &mut delta[i * n..(i + 1) * n];
             for a in 0..n {
                 di[a] = gi[a] - T::splat(fne[i * n + a]);
             }
-            rest = rest + T::splat(p.closeness[i]) * sum_of_squares(di);
+            rest = rest.plus(T::splat(p.closeness[i]), sum_of_squares(di));
         }
         let quartic = sum_of_squares(x);
         for (group, w) in p.coupling.iter().enumerate() {
@@ -106,7 +106,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             symmetric_product(e, n, m, &w[..m * n], delta, T::splat(1.0));
             rest = rest + sum_of_squares(e);
         }
-        T::splat(p.gamma[0]) * quartic + rest
+        rest.plus(T::splat(p.gamma[0]), quartic)
     }
 
     #[inline(always)]
@@ -152,7 +152,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
                     let q = &quadratic[(i * n + a) * width + j * n..][..n];
                     let scale = factor * gj[a];
                     for b in 0..n {
-                        h[b] = T::splat(q[b]) + scale * gi[b];
+                        h[b] = T::splat(q[b]).plus(scale, gi[b]);
                     }
                     h[a] = h[a] + same;
                 }
@@ -161,7 +161,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             for a in 0..n {
                 let h = &mut out[(i * n + a) * width + i * n..][..n];
                 for (h, &x) in h.iter_mut().zip(&x[a * n..(a + 1) * n]) {
-                    *h = *h + own * x;
+                    *h = h.plus(own, x);
                 }
             }
         }
@@ -193,15 +193,15 @@ pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, m: usize, w: &
         for a in 0..n {
             let factor = T::splat(w[i * n + a]);
             for b in 0..n {
-                e[a * n + b] = e[a * n + b] + factor * delta[i * n + b];
+                e[a * n + b] = e[a * n + b].plus(factor, delta[i * n + b]);
             }
         }
     }
     for a in 0..n {
         for b in 0..=a {
             let (low, high) = (e[a * n + b], e[b * n + a]);
-            e[a * n + b] = low + sign * high;
-            e[b * n + a] = high + sign * low;
+            e[a * n + b] = low.plus(sign, high);
+            e[b * n + a] = high.plus(sign, low);
         }
     }
 }
@@ -212,7 +212,7 @@ pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T]
     for a in 0..n {
         let scale = factor * x[a];
         for b in 0..n {
-            row[b] = row[b] + scale * e[a * n + b];
+            row[b] = row[b].plus(scale, e[a * n + b]);
         }
     }
 }
@@ -223,7 +223,7 @@ pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[f64], e: &[T
     for a in 0..n {
         let scale = T::splat(4.0 * w[a]);
         for b in 0..n {
-            row[b] = row[b] + scale * e[a * n + b];
+            row[b] = row[b].plus(scale, e[a * n + b]);
         }
     }
 }
