@@ -29,8 +29,15 @@ const GROUP: usize = 64;
 /// Entries of one instant that a thread is solving right now.
 #[derive(Debug, Default)]
 struct Claims {
-    held: Mutex<HashSet<Topology>>,
+    held: Mutex<Held>,
     released: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Held {
+    topologies: HashSet<Topology>,
+    /// Threads that wait for one of them: to wake nobody is a call to the system too.
+    waiting: usize,
 }
 
 /// A claim; dropping it, also by a panic or a cancellation, lets the others go on.
@@ -40,20 +47,22 @@ struct Claim<'a> {
 }
 
 impl Claims {
-    fn lock(&self) -> MutexGuard<'_, HashSet<Topology>> {
+    fn lock(&self) -> MutexGuard<'_, Held> {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn claim<'a>(&'a self, topology: &'a Topology) -> Option<Claim<'a>> {
-        let free = self.lock().insert(topology.clone());
+        let free = self.lock().topologies.insert(topology.clone());
         free.then(|| Claim { claims: self, topology })
     }
 
     fn wait(&self, topology: &Topology, cancel: &CancelToken) -> Result<(), Cancelled> {
         let mut held = self.lock();
-        while held.contains(topology) {
+        while held.topologies.contains(topology) {
             cancel.check()?;
+            held.waiting += 1;
             held = self.released.wait_timeout(held, PATIENCE).unwrap_or_else(PoisonError::into_inner).0;
+            held.waiting -= 1;
         }
         Ok(())
     }
@@ -61,8 +70,11 @@ impl Claims {
 
 impl Drop for Claim<'_> {
     fn drop(&mut self) {
-        self.claims.lock().remove(self.topology);
-        self.claims.released.notify_all();
+        let mut held = self.claims.lock();
+        held.topologies.remove(self.topology);
+        if held.waiting > 0 {
+            self.claims.released.notify_all();
+        }
     }
 }
 

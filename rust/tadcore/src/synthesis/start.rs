@@ -102,7 +102,7 @@ impl<T: Number> Default for Layout<T> {
 impl<T: Number> Layout<T> {
     /// Lists the variables of the lanes, for as many copies of the `width` gains.
     #[inline(always)]
-    pub(super) fn list<'a>(&mut self, lanes: [&'a [Variable]; 8], width: usize, copies: usize) {
+    pub(super) fn list(&mut self, lanes: [&[Variable]; 8], width: usize, copies: usize) {
         self.seen.clear();
         self.seen.resize(width, (0, 0, 0));
         for (lane, variables) in lanes.into_iter().enumerate() {
