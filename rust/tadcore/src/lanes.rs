@@ -64,7 +64,7 @@ pub(crate) fn sum_of_squares<T: Number>(numbers: &[T]) -> T {
     dot(numbers, numbers)
 }
 
-/// Σxy, in four sums that do not wait for one another.
+/// Σxy, in four sums that do not wait for one another: for lengths that are the same for all lanes and neighbours.
 #[inline(always)]
 pub(crate) fn dot<T: Number>(x: &[T], y: &[T]) -> T {
     let (mut s0, mut s1, mut s2, mut s3) = (T::splat(0.0), T::splat(0.0), T::splat(0.0), T::splat(0.0));
@@ -83,6 +83,16 @@ pub(crate) fn dot<T: Number>(x: &[T], y: &[T]) -> T {
         i += 1;
     }
     (s0 + s1) + (s2 + s3)
+}
+
+/// Σxy, one after another: zeros between the terms change nothing.
+#[inline(always)]
+pub(crate) fn dot_in_order<T: Number>(x: &[T], y: &[T]) -> T {
+    let mut sum = T::splat(0.0);
+    for (&x, &y) in x.iter().zip(y) {
+        sum = sum.plus(x, y);
+    }
+    sum
 }
 
 impl Number for f64 {

@@ -7,12 +7,13 @@
 //!
 //! A list of descents is worked through in the lanes of a [`Number`]: each lane is at its own point, with its own μ, and
 //! takes the next descent of the list when its own has ended. No lane sees another, so what a descent gives does not
-//! depend on its neighbours, nor on whether it had any.
+//! depend on its neighbours, nor on whether it had any: sums over the unknowns, among which a lane finds zeros for those
+//! of its neighbours, go in order.
 
 use super::dense;
 use super::start::{Layout, Variable};
 use super::tasks::{Limits, Owner, Reached, Tasks};
-use crate::lanes::{Number, dot, norm, sum_of_squares};
+use crate::lanes::{Number, dot_in_order};
 
 /// A function of gains laid out as one vector of `width` entries.
 pub(super) trait Objective<T: Number> {
@@ -224,7 +225,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             raise = T::select(T::mask(definite), raise, raise.or_larger(lack));
             if definite != 0 {
                 dense::back(factor, d, step);
-                let length2 = sum_of_squares(step);
+                let length2 = dot_in_order(step, step);
                 let short = T::bits(length2.at_most(T::splat(limits.longest * limits.longest)));
                 let long = definite & !short;
                 if long != 0 {
@@ -233,14 +234,14 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                     dense::forward(factor, d, library, w_step);
                     let length = length2.sqrt();
                     let excess = length * T::splat(1.0 / (AIM * limits.longest)) - T::splat(1.0);
-                    let better = s.damping + length2 / sum_of_squares(w_step) * excess;
+                    let better = s.damping + length2 / dot_in_order(w_step, w_step) * excess;
                     let least = (T::splat(LEAST_RAISE) * s.damping)
                         .or_larger(T::splat(FIRST_DAMPING * FIRST_DAMPING) * largest)
                         .or_larger(T::splat(f64::MIN_POSITIVE));
                     raise = T::select(T::mask(long), least.or_larger(better), raise);
                 }
                 failed |= long;
-                predicted = T::splat(-0.5) * (dot(step, gradient) - s.damping * length2);
+                predicted = T::splat(-0.5) * (dot_in_order(step, gradient) - s.damping * length2);
                 let rest = s.value - T::splat(REST) * predicted;
                 let hopeless = T::bits(s.damping.at_most(zero))
                     & T::bits(predicted.less(T::splat(FALLING) * s.expected))
@@ -263,7 +264,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             let value = objective.value(trial);
             objective.gradient(trial, trial_slope);
             layout.restrict(trial_slope, step);
-            let slope = norm(step);
+            let slope = dot_in_order(step, step).sqrt();
             let actual = s.value - value;
             let paid = T::bits((T::splat(1e-4) * predicted).less(actual));
             let small = T::bits(predicted.at_most(noise));
