@@ -4,8 +4,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; `cost` stands beside `simulation` and reads its records.
-const LAYERS: [&str; 11] =
-    ["error", "cancel", "width", "game", "riccati", "network", "synthesis", "policy", "simulation", "cost", "ensemble"];
+const LAYERS: [&str; 12] = [
+    "error",
+    "cancel",
+    "width",
+    "lanes",
+    "game",
+    "riccati",
+    "network",
+    "synthesis",
+    "policy",
+    "simulation",
+    "cost",
+    "ensemble",
+];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a source folder") {

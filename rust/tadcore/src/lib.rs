@@ -39,6 +39,7 @@
 //! |---|---|
 //! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
 //! | `width` | loops compiled for each vector width |
+//! | `lanes` | one number, or several side by side in a register |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
 //! | [`network`] | who sees whom; what each player may use |
