@@ -96,9 +96,10 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             let r = T::splat(p.r[i]);
             for a in 0..n {
                 let (fa, fb) = (r * ai[a], r * bi[a]);
+                let (real, imaginary) = (&mut real[a * n..][..n], &mut imaginary[a * n..][..n]);
                 for b in 0..n {
-                    real[a * n + b] = real[a * n + b].plus(fa, ai[b]).plus(fb, bi[b]);
-                    imaginary[a * n + b] = imaginary[a * n + b].plus(fa, bi[b]).minus(fb, ai[b]);
+                    real[b] = real[b].plus(fa, ai[b]).plus(fb, bi[b]);
+                    imaginary[b] = imaginary[b].plus(fa, bi[b]).minus(fb, ai[b]);
                 }
             }
             let di = &mut delta[i * n..(i + 1) * n];
@@ -210,12 +211,16 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             }
             let own = T::splat(4.0 * p.gamma[0] * p.r[i]);
             for a in 0..n {
-                let (row, column) = ((i * n + a) * width, i * n);
-                for b in 0..n {
-                    let (r, i, at) = (real[a * n + b], imaginary[a * n + b], row + column + b);
-                    upper[at] = upper[at].plus(own, r);
-                    lower[at + half] = lower[at + half].plus(own, r);
-                    lower[at] = lower[at].minus(own, i);
+                let at = (i * n + a) * width + i * n;
+                let (xr, xi) = (&real[a * n..][..n], &imaginary[a * n..][..n]);
+                for (h, &x) in upper[at..][..n].iter_mut().zip(xr) {
+                    *h = h.plus(own, x);
+                }
+                for (h, &x) in lower[at + half..][..n].iter_mut().zip(xr) {
+                    *h = h.plus(own, x);
+                }
+                for (h, &x) in lower[at..][..n].iter_mut().zip(xi) {
+                    *h = h.minus(own, x);
                 }
             }
         }

@@ -90,8 +90,8 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             let r = T::splat(p.r[i]);
             for a in 0..n {
                 let factor = r * gi[a];
-                for b in 0..n {
-                    x[a * n + b] = x[a * n + b].plus(factor, gi[b]);
+                for (x, &g) in x[a * n..(a + 1) * n].iter_mut().zip(gi) {
+                    *x = x.plus(factor, g);
                 }
             }
             let di = &mut delta[i * n..(i + 1) * n];
@@ -185,15 +185,15 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
 #[inline(always)]
 pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, m: usize, w: &[f64], delta: &[T], sign: T) {
     for a in 0..n {
-        for b in 0..n {
-            e[a * n + b] = T::splat(w[a]) * delta[b];
+        for (e, &d) in e[a * n..(a + 1) * n].iter_mut().zip(&delta[..n]) {
+            *e = T::splat(w[a]) * d;
         }
     }
     for i in 1..m {
         for a in 0..n {
             let factor = T::splat(w[i * n + a]);
-            for b in 0..n {
-                e[a * n + b] = e[a * n + b].plus(factor, delta[i * n + b]);
+            for (e, &d) in e[a * n..(a + 1) * n].iter_mut().zip(&delta[i * n..(i + 1) * n]) {
+                *e = e.plus(factor, d);
             }
         }
     }
@@ -211,8 +211,8 @@ pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, m: usize, w: &
 pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T], e: &[T]) {
     for a in 0..n {
         let scale = factor * x[a];
-        for b in 0..n {
-            row[b] = row[b].plus(scale, e[a * n + b]);
+        for (row, &e) in row.iter_mut().zip(&e[a * n..(a + 1) * n]) {
+            *row = row.plus(scale, e);
         }
     }
 }
@@ -222,8 +222,8 @@ pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T]
 pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[f64], e: &[T]) {
     for a in 0..n {
         let scale = T::splat(4.0 * w[a]);
-        for b in 0..n {
-            row[b] = row[b].plus(scale, e[a * n + b]);
+        for (row, &e) in row.iter_mut().zip(&e[a * n..(a + 1) * n]) {
+            *row = row.plus(scale, e);
         }
     }
 }
