@@ -232,10 +232,11 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
     StoreError
         The folder is no store, or one of its files is truncated, foreign or damaged.
     """
+    from ._manifest import Manifest
     from ._samplers import from_table
     from ._table import schema_of
     from .scenario import Scenario
-    from .store import Manifest, Store
+    from .store import Store
     from .study import Study
 
     manifest = Manifest.read(folder)

@@ -36,6 +36,7 @@ from ._chunks import Plan
 from ._collect import StoppingRule, collect, jobs_of
 from ._design import DESIGNS, Design
 from ._game import game_of
+from ._manifest import Manifest
 from ._progress import Progress
 from ._samplers import as_sampler
 from ._table import schema_of
@@ -45,7 +46,7 @@ from .errors import ScenarioError
 from .result import StudyResult, load_study
 from .sampling import Sampler
 from .scenario import Scenario
-from .store import Manifest, Store
+from .store import Store
 
 __all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
 
