@@ -13,14 +13,17 @@ import platform
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from . import _core
 from ._design import CHUNK, STREAM
+from ._files import MOST, strange
 from ._samplers import as_plain, from_plain
-from .errors import StoreError
+from .errors import StoreError, shorten
 
 __all__ = ["FORMAT", "SEAL", "Manifest", "environment", "reason", "seal"]
+
+Kind = TypeVar("Kind")
 
 FORMAT = 2
 """Version of the layout of a store; 1 had no digest of the manifest."""
@@ -98,11 +101,17 @@ class Manifest:
         """The manifest of a store; raises `StoreError` where there is none that can be read."""
         path = Path(folder) / "manifest.json"
         try:
-            data = path.read_bytes()
+            found = strange(path)
+            if found is not None:
+                raise StoreError(str(path), f"it is {found}, not a file", "name the folder of a study")
+            with path.open("rb") as stream:
+                data = stream.read(MOST + 1)
         except FileNotFoundError:
             raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
         except OSError as error:
             raise StoreError(str(path), f"it cannot be read ({reason(error)})", "check the path") from None
+        if len(data) > MOST:
+            raise StoreError(str(path), f"it has more than {MOST >> 20} MiB", "name the folder of a study")
         return cls.from_json(data, str(path))
 
     @classmethod
@@ -111,24 +120,25 @@ class Manifest:
         try:
             content = json.loads(data.decode("utf-8"))
             if content["format"] != FORMAT:
-                found = f"it has format {content['format']}, and this version of tadcore reads {FORMAT}"
+                found = f"it has format {shorten(content['format'])}, and this version of tadcore reads {FORMAT}"
                 raise StoreError(path, found, "read it with the version that wrote it, or run the study anew elsewhere")
             if content.pop(SEAL) != seal(content):
                 found = "its digest does not fit its content: it was edited or damaged"
                 raise StoreError(path, found, "put back a copy of this file, or run the study anew in another folder")
+            columns = _entry(content, "columns", list)
             manifest = cls(
-                scenario=str(content["scenario"]),
-                vary=from_plain(dict(content["vary"])),
-                seed=int(content["seed"]),
-                design=str(content["design"]),
-                trials=int(content["trials"]),
-                columns=tuple(content["columns"]),
-                stopped=None if content["stopped"] is None else int(content["stopped"]),
-                chunk=int(content["chunk"]),
-                stream=int(content["stream"]),
-                version=str(content["tadcore_version"]),
-                created=str(content["created"]),
-                environment=dict(content["environment"]),
+                scenario=_entry(content, "scenario", str),
+                vary=from_plain(_entry(content, "vary", dict)),
+                seed=_whole(content, "seed"),
+                design=_entry(content, "design", str),
+                trials=_whole(content, "trials"),
+                columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
+                stopped=None if content["stopped"] is None else _whole(content, "stopped"),
+                chunk=_whole(content, "chunk"),
+                stream=_whole(content, "stream"),
+                version=_entry(content, "tadcore_version", str),
+                created=_entry(content, "created", str),
+                environment=_entry(content, "environment", dict),
             )
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             lacks = f"it has no entry {error}" if isinstance(error, KeyError) else error
@@ -148,6 +158,21 @@ def environment() -> dict[str, str]:
 def reason(error: OSError) -> str:
     """What the operating system says, without the path."""
     return error.strerror or str(error)
+
+
+def _entry(content: dict[str, Any], name: str, kind: type[Kind]) -> Kind:
+    """An entry of its kind; nothing is taken for what it is not."""
+    value = content[name]
+    if type(value) is not kind:
+        raise ValueError(f"its {name} is {shorten(value)}")
+    return value
+
+
+def _whole(content: dict[str, Any], name: str) -> int:
+    value = _entry(content, name, int)
+    if not 0 <= value < 2**64:
+        raise ValueError(f"its {name} is {shorten(value)}")
+    return value
 
 
 def seal(content: dict[str, Any]) -> str:

@@ -22,7 +22,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
-from ._files import write_whole
+from ._files import strange, write_whole
 from ._manifest import Manifest, environment, reason
 from ._table import digest, encoded
 from .errors import StoreError
@@ -106,11 +106,15 @@ class Store:
         """Rows of every part, by chunk; raises `StoreError` naming one that does not belong here."""
         rows: dict[int, int] = {}
         with _faults(self.folder):
-            found = sorted(self.folder.glob("part-*.parquet"))
-        for path in found:
+            parts = sorted(self.folder.glob("part-*.parquet"))
+        for path in parts:
             match = _PART.fullmatch(path.name)
             if match is None or path.name != self._part(int(match[1])).name:
                 raise StoreError(str(path), "its name is not that of a part", "move it out of this folder")
+            with _faults(path):
+                found = strange(path)
+            if found is not None:
+                raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
             rows[int(match[1])] = self._rows_of(path, int(match[1]))
         return rows
 
