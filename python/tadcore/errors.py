@@ -250,7 +250,7 @@ _reader.maxlist = _reader.maxtuple = _reader.maxarray = 4
 _reader.maxlong = 24
 
 
-_LISTED = 20  # of several errors at once
+_LISTED = 50  # of several errors at once
 _LONGEST = 1000  # characters of a path or a rule, in a message
 
 

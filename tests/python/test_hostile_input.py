@@ -3,6 +3,7 @@
 import os
 import socket
 
+import numpy as np
 import pytest
 
 import tadcore
@@ -10,7 +11,7 @@ from study_cases import calm, resealed, study
 from tadcore import Scenario, ScenarioError, StoreError
 from tadcore._files import parse_toml
 from tadcore.cli import main
-from tadcore.sampling import Box
+from tadcore.sampling import Box, Choice
 
 TEXT = tadcore.scenarios.load("paper-i1").to_toml()
 
@@ -143,7 +144,7 @@ def test_of_very_many_errors_the_first_are_listed():
         Scenario.from_toml_string(many + TEXT)
     assert len(caught.value.errors) == 20_000
     lines = str(caught.value).split("\n")
-    assert (lines[0], lines[-1], len(lines)) == ("20,000 fields cannot be accepted:", "  … and 19,980 more", 22)
+    assert (lines[0], lines[-1], len(lines)) == ("20,000 fields cannot be accepted:", "  … and 19,950 more", 52)
 
 
 HIDDEN = "\x1b[2J\x1b[31m\x07\u202e\r"
@@ -214,3 +215,26 @@ def test_a_defender_that_is_not_there_is_answered_with_those_that_are(path):
     alone = Scenario.from_toml_string("[[defenders]]".join(TEXT.split("[[defenders]]")[:2]))
     with pytest.raises(ScenarioError, match=r"which has 1 defender, number 0$"):
         tadcore.Study(alone, {"defenders.1.capture_radius": Box(0.1, 1)}, trials=1)
+
+
+def test_a_masked_entry_is_no_number():
+    """What stands under a mask is whatever was there before."""
+    sc = calm()
+    holes = np.ma.masked_greater(sc.positions, 1.0)
+    with pytest.raises(ScenarioError, match="positions: got 'an array with masked entries'"):
+        tadcore.simulate_batch(sc, np.ma.stack([holes]))
+    with pytest.raises(ScenarioError, match="visibility_radii: got 'an array with masked entries'"):
+        tadcore.simulate_batch(sc, [sc.positions], visibility_radii=np.ma.masked_equal([1.0, 2.0, 3.0], 2.0))
+    point = np.ma.masked_equal([0.5, 2.0], 2.0)
+    for draw in (lambda: Box(point, [3.0, 3.0]), lambda: Choice(np.ma.stack([point]))):
+        with pytest.raises(ScenarioError):
+            draw()
+    with pytest.raises(ScenarioError, match="got nan, must be a finite number"):
+        tadcore.Study(sc, {"attacker.position": lambda rng, size: np.ma.stack([point] * size)}, trials=5).run()
+    whole = tadcore.simulate_batch(sc, np.ma.stack([sc.positions]))
+    assert whole[0] == tadcore.simulate(sc).outcome
+
+
+def test_a_whole_number_beyond_all_doubles_is_refused():
+    with pytest.raises(ScenarioError, match=r"hysteresis: got 1000.*, must be a finite number of at least 0"):
+        tadcore.simulate(calm(), hysteresis=10**400)
