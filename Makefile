@@ -57,10 +57,10 @@ fuzz: $(STAMP)  ## hostile bytes for the core, the saved table and the readers o
 
 # The standard library is not instrumented: docs/reliability.md says what that hides, and what it makes up.
 SANITIZED = RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR=target/sanitize-$(1) RUSTFLAGS="-Zsanitizer=$(1) $(2)" PROPTEST_CASES=8 \
-  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore --lib $(3)
+  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore $(3)
 
 sanitize:  ## the core's Rust tests under AddressSanitizer, the shared table's under ThreadSanitizer (Linux, x86-64)
-	$(call SANITIZED,address,,--tests)
+	$(call SANITIZED,address,,--lib --tests)
 	$(call SANITIZED,thread,-Cunsafe-allow-abi-mismatch=sanitizer,--test ensemble --test paper)
 
 mutants:  ## a sign flipped or an operator swapped in each formula of the core: which Rust test notices
