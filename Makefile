@@ -11,7 +11,7 @@ RUSTDOC := -D warnings --html-in-header $(CURDIR)/rust/tadcore/katex.html
 RUST    := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python heavy faults fuzz mutants audit lint format bench peers images docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python heavy faults fuzz sanitize mutants audit lint format bench peers images docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"
@@ -54,6 +54,14 @@ fuzz: $(STAMP)  ## hostile bytes for the core, the saved table and the readers o
 	    -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=2048 || exit 1; done
 	$(BIN)/python -m pip install --quiet atheris
 	$(BIN)/python fuzz/scenario.py fuzz/corpus/scenario -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=6000
+
+# The standard library is not instrumented: docs/reliability.md says what that hides, and what it makes up.
+SANITIZED = RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR=target/sanitize-$(1) RUSTFLAGS="-Zsanitizer=$(1) $(2)" PROPTEST_CASES=8 \
+  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore $(3)
+
+sanitize:  ## the core's Rust tests under AddressSanitizer, the shared table's under ThreadSanitizer (Linux, x86-64)
+	$(call SANITIZED,address,,--lib --tests)
+	$(call SANITIZED,thread,-Cunsafe-allow-abi-mismatch=sanitizer,--test ensemble --test paper)
 
 mutants:  ## a sign flipped or an operator swapped in each formula of the core: which Rust test notices
 	$(PYTHON) tests/mutants

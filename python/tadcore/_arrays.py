@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ _LISTED = 20
 
 
 def as_real(field: str, values: ArrayLike, rule: str) -> NDArray[np.float64]:
-    """A C-contiguous float64 array from real numbers; strings, bools and ragged lists are refused."""
+    """A C-contiguous float64 array from real numbers; strings, bools, ragged lists and masked entries are refused."""
     try:
         array = np.asarray(values)
     except (ValueError, TypeError) as error:
         raise ScenarioError(field, values, rule) from error
+    if np.ma.is_masked(values):
+        raise ScenarioError(field, "an array with masked entries", rule)
     if array.dtype.kind not in "iuf" and array.size > 0:
         raise ScenarioError(field, values, rule)
     return np.ascontiguousarray(array, dtype=np.float64)
@@ -79,7 +82,7 @@ def as_amount(field: str, value: Any) -> float:
     if (
         isinstance(value, int | float | np.integer | np.floating)
         and not isinstance(value, bool)
-        and 0 <= value < np.inf
+        and 0 <= value <= sys.float_info.max
     ):
         return float(value)
     raise ScenarioError(field, value, "a finite number of at least 0")

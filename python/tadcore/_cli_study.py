@@ -46,7 +46,7 @@ def study(
 
     Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
     """
-    from .store import Manifest
+    from ._manifest import Manifest
     from .study import Study
 
     wanted = Study.from_toml(file)

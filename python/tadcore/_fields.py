@@ -68,6 +68,9 @@ def _kind(rule: str, holds: Callable[[float], bool]) -> Callable[[object], float
 LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
 """Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
 
+MOST_DEFENDERS = 1000
+"""Far beyond what can be played; P of so many players fits into memory on the shortest grids only."""
+
 is_positive = _kind("a positive finite number", lambda v: v > 0.0 and math.isfinite(v))
 _is_bounded_weight = _kind("a weight between 1e-30 and 1e30", lambda v: LIGHTEST <= v <= HEAVIEST)
 _is_near = _kind("a coordinate between -1e100 and 1e100", lambda v: abs(v) <= FARTHEST)
@@ -130,10 +133,13 @@ def is_gamma(value: object) -> tuple[float, ...]:
 
 
 def is_team(value: object) -> object:
-    """At least one defender."""
+    """At least one defender, and no more than any game could play."""
     rule = "a list of at least one defender ([[defenders]] tables in TOML)"
-    if not _sequence(value, rule):
+    team = _sequence(value, rule)
+    if not team:
         raise refuse(value, rule)
+    if len(team) > MOST_DEFENDERS:
+        raise refuse(f"{len(team):,} defenders", f"a list of at most {MOST_DEFENDERS:,} defenders")
     return value
 
 
@@ -173,15 +179,18 @@ def _missing(owner: type[BaseModel] | None, name: str) -> str:
     return f"given: {field.description}" if field and field.description else "given"
 
 
-def _unknown(owner: type[BaseModel] | None, name: str) -> str:
-    if owner is None:
+_HINTS = 100  # unknown fields for which a known one is looked up; a file may hold a million
+
+
+def _unknown(owner: type[BaseModel] | None, name: str, hint: bool) -> str:
+    if owner is None or not hint:
         return "left out: there is no such field"
     close = difflib.get_close_matches(name, owner.model_fields, n=1)
-    hint = f"did you mean {close[0]}?" if close else f"the fields are {', '.join(owner.model_fields)}"
-    return f"left out: there is no such field; {hint}"
+    known = f"did you mean {close[0]}?" if close else f"the fields are {', '.join(owner.model_fields)}"
+    return f"left out: there is no such field; {known}"
 
 
-def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str) -> list[ScenarioError]:
+def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str, hint: bool) -> list[ScenarioError]:
     location: Location = detail["loc"]
     kind = detail["type"]
     name = str(location[-1]) if location else ""
@@ -194,7 +203,7 @@ def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str) -> list[Sce
     if kind == "missing":
         return [ScenarioError(field, MISSING, _missing(_owner(model, location), name))]
     if kind == "extra_forbidden":
-        return [ScenarioError(field, detail["input"], _unknown(_owner(model, location), name))]
+        return [ScenarioError(field, detail["input"], _unknown(_owner(model, location), name, hint))]
     if kind == "literal_error":
         return [ScenarioError(field, detail["input"], str(detail["ctx"]["expected"]).replace("'", '"'))]
     if kind in ("model_type", "model_attributes_type", "dict_type"):
@@ -210,5 +219,7 @@ def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str) -> list[Sce
 def scenario_error(error: ValidationError, model: type[BaseModel], root: str = "") -> ScenarioError:
     """What pydantic found, in the words of this library; fields are named from `root`."""
     return ScenarioError.collect(
-        single for detail in error.errors(include_url=False) for single in _unfold(detail, model, root)
+        single
+        for number, detail in enumerate(error.errors(include_url=False))
+        for single in _unfold(detail, model, root, number < _HINTS)
     )

@@ -140,7 +140,10 @@ def _look_up(node: Any, part: str | int, path: str, value: Any) -> Any:
     try:
         if isinstance(part, int) == isinstance(node, list):
             return node[part]
-    except (KeyError, IndexError, TypeError):
+    except IndexError:
+        rule = f"the path of a field that exists: the list holds {len(node)}, numbered from 0"
+        raise ScenarioError(path, value, rule) from None
+    except (KeyError, TypeError):
         pass
     raise ScenarioError(path, value, "the path of a field that exists")
 

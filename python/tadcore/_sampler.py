@@ -80,7 +80,12 @@ def numbers(field: str, value: ArrayLike | None) -> float | tuple[float, ...]:
         array = np.asarray(value)
     except (TypeError, ValueError):
         raise ScenarioError(field, value, rule) from None
-    if array.dtype.kind not in "iuf" or array.shape not in ((), (2,), (3,)) or not np.isfinite(array).all():
+    if (
+        np.ma.is_masked(value)
+        or array.dtype.kind not in "iuf"
+        or array.shape not in ((), (2,), (3,))
+        or not np.isfinite(array).all()
+    ):
         raise ScenarioError(field, value, rule)
     return float(array) if array.ndim == 0 else tuple(map(float, array))
 

@@ -247,7 +247,7 @@ def _named(field: str, make: Callable[[], Sampler]) -> Sampler:
 
 def _shaped(name: str, values: Any, size: int, components: int) -> NDArray[np.float64]:
     """Check what a callable returned."""
-    array = np.asarray(values)
+    array = np.ma.filled(values.astype(np.float64), np.nan) if np.ma.is_masked(values) else np.asarray(values)
     wanted = {(size, components), (size,)} if components == 1 else {(size, components)}
     if array.dtype.kind not in "iuf" or array.shape not in wanted:
         rule = f"an array of numbers of shape {max(wanted)}, one row for each trial"

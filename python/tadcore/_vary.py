@@ -142,11 +142,22 @@ def _refused(sc: Scenario, known: Mapping[str, Quantity], path: str) -> Scenario
         return ScenarioError(
             f'vary["{path}"]', path, "left out: it belongs to interaction I2, and this is I1, where the target sees all"
         )
+    if beyond(sc, pattern):
+        return ScenarioError(f'vary["{path}"]', path, beyond(sc, pattern))
     wild = {re.sub(r"^defenders\.\d+", "defenders.*", name) for name in known if name.startswith("defenders")}
     close = difflib.get_close_matches(pattern, [*known, *wild], n=1, cutoff=0.4)
     hint = f"; did you mean {close[0]}?" if close else ""
     some = "attacker.position, defenders.*.visibility_radius or defenders.0.capture_radius"
     return ScenarioError(f'vary["{path}"]', path, f"the path of a position or a radius, such as {some}{hint}")
+
+
+def beyond(sc: Scenario, path: str) -> str:
+    """What the path of a defender that is not there must be; nothing where the path is of no such defender."""
+    numbered = re.match(r"defenders\.(\d+)(\.|$)", path)
+    if numbered is None or (len(numbered[1]) < 10 and int(numbered[1]) < sc.n):
+        return ""
+    team = "1 defender, number 0" if sc.n == 1 else f"{sc.n} defenders, numbered from 0 to {sc.n - 1}"
+    return f"the path of a defender of this game, which has {team}"
 
 
 def game_fields(sc: Scenario) -> list[str]:
@@ -162,7 +173,8 @@ def component(sc: Scenario, name: str) -> Quantity:
     found = _known(sc).get(name) if isinstance(name, str) else None
     if found is None or found.components > 1 or found.path.endswith(".position"):
         rule = "a number that varies within one game, such as attacker.position.x or defenders.0.visibility_radius"
-        raise ScenarioError("input", name, f"{rule}, of a player of this game")
+        missing = beyond(sc, name) if isinstance(name, str) else ""
+        raise ScenarioError("input", name, missing or f"{rule}, of a player of this game")
     return found
 
 

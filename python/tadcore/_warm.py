@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._files import write_whole
+from ._files import strange, write_whole
 from ._game import game_of
 
 if TYPE_CHECKING:
@@ -32,6 +32,9 @@ def warm(sc: Scenario, path: str | os.PathLike[str] | None) -> Iterator[None]:
     held = 0
     if place.exists():
         try:
+            found = strange(place)
+            if found is not None:
+                raise ValueError(f"it is {found}, not a file")
             held = game.load_table(place.read_bytes())
         except (ValueError, OSError) as error:
             warnings.warn(f"{place}: {error}; the study starts with an empty table", RuntimeWarning, stacklevel=4)

@@ -79,9 +79,11 @@ class ScenarioError(TadcoreError, ValueError):
 
     def __str__(self) -> str:
         if len(self.errors) == 1:
-            return f"{self.field}: got {_shorten(self.value)}, must be {self.rule}"
-        lines = "".join(f"\n  {error}" for error in self.errors)
-        return f"{len(self.errors)} fields cannot be accepted:{lines}"
+            return f"{_printable(self.field)}: got {shorten(self.value)}, must be {_printable(self.rule)}"
+        lines = [f"\n  {error}" for error in self.errors[:_LISTED]]
+        more = len(self.errors) - len(lines)
+        lines += [f"\n  … and {more:,} more"] if more else []
+        return f"{len(self.errors):,} fields cannot be accepted:{''.join(lines)}"
 
     def __reduce__(self) -> tuple[object, ...]:
         if len(self.errors) == 1:
@@ -170,7 +172,7 @@ class StoreError(TadcoreError, RuntimeError):
         self.remedy = remedy
 
     def __str__(self) -> str:
-        return f"{self.path}: {self.found}; {self.remedy}"
+        return f"{_printable(self.path)}: {_printable(self.found)}; {self.remedy}"
 
 
 class WorkerError(TadcoreError, RuntimeError):
@@ -248,7 +250,18 @@ _reader.maxlist = _reader.maxtuple = _reader.maxarray = 4
 _reader.maxlong = 24
 
 
-def _shorten(value: object) -> str:
+_LISTED = 50  # of several errors at once
+_LONGEST = 1000  # characters of a path or a rule, in a message
+
+
+def _printable(text: str) -> str:
+    """A text that a stranger may have written: what moves the cursor or turns the writing is escaped."""
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def shorten(value: object) -> str:
     """A readable form of any value, never long and never raising."""
     tolist = getattr(value, "tolist", None)  # NumPy arrays and scalars read better as Python numbers
     try:

@@ -12,6 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ._arrays import as_index
+from ._files import as_path
 from ._vary import indexed, setups
 from .outcome import OutcomeKind
 from .simulation import Run, simulate
@@ -229,16 +230,19 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
 
     Raises
     ------
+    ScenarioError
+        What was given is no path.
     StoreError
         The folder is no store, or one of its files is truncated, foreign or damaged.
     """
+    from ._manifest import Manifest
     from ._samplers import from_table
     from ._table import schema_of
     from .scenario import Scenario
-    from .store import Manifest, Store
+    from .store import Store
     from .study import Study
 
-    manifest = Manifest.read(folder)
+    manifest = Manifest.read(as_path("folder", folder))
     vary = {path: from_table(f'vary["{path}"]', table, stored=True) for path, table in manifest.vary.items()}
     study = Study(
         Scenario.from_toml_string(manifest.scenario, name=os.fspath(folder)),

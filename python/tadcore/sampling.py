@@ -234,7 +234,11 @@ class _Listed(Parameters):
             array = np.asarray(self.values, dtype=np.float64)
         except (TypeError, ValueError):
             raise ScenarioError(name, self.values, rule) from None
-        real = np.asarray(self.values).dtype.kind in "iuf" and not np.isnan(array).any()
+        real = (
+            np.asarray(self.values).dtype.kind in "iuf"
+            and not np.ma.is_masked(self.values)
+            and not np.isnan(array).any()
+        )
         if array.ndim not in (1, 2) or not array.size or not real:
             raise ScenarioError(name, self.values, rule)
         self.keep("values", tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist()))

@@ -32,7 +32,7 @@ import tomli_w
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from ._fields import Fraction, Gamma, Position, Positive, Problem, Radius, Weight, is_team, refusal
+from ._fields import MOST_DEFENDERS, Fraction, Gamma, Position, Positive, Problem, Radius, Weight, is_team, refusal
 from ._files import parse_toml, read_text, write_whole
 from ._model import CheckedModel
 
@@ -124,7 +124,8 @@ class Scenario(CheckedModel):
     attacker: Attacker = Field(description="the [attacker] table")
     target: Target = Field(description="the [target] table")
     defenders: Annotated[tuple[Defender, ...], BeforeValidator(is_team)] = Field(
-        json_schema_extra={"minItems": 1}, description="one [[defenders]] table for each defender"
+        json_schema_extra={"minItems": 1, "maxItems": MOST_DEFENDERS},
+        description="one [[defenders]] table for each defender",
     )
 
     @model_validator(mode="after")

@@ -1,146 +1,36 @@
 """A study on disk: a folder of Parquet parts, one for each finished chunk, and a manifest that says whose they are.
 
-``manifest.json`` holds the scenario, what varies, seed and design, the versions and a digest of them all;
-``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with that digest, the chunk, the number of
-rows and a digest of the rows in its metadata. Every file appears whole: it is written under a temporary name, brought
-to the disk and renamed. One run at a time writes to a store, under a lock of the operating system that ends with the
-process; any number may read.
+``manifest.json`` holds the scenario, what varies, seed and design, a digest of these, the length and the versions, and
+a digest of all its content; ``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with the digest
+of the study, the chunk, the number of rows and a digest of the rows in its metadata. Every file appears whole: it is
+written under a temporary name, brought to the disk and renamed. One run at a time writes to a store, under a lock of
+the operating system that ends with the process; any number may read.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
-import json
 import os
-import platform
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
-from . import _core
-from ._design import CHUNK, STREAM
-from ._files import write_whole
-from ._samplers import as_plain, from_plain
+from ._files import strange, write_whole
+from ._manifest import Manifest, environment, reason
 from ._table import digest, encoded
 from .errors import StoreError
 
-__all__ = ["FORMAT", "Manifest", "Store"]
-
-FORMAT = 1
-"""Version of the layout of a store."""
+__all__ = ["Store"]
 
 _PART = re.compile(r"part-(\d{6,})\.parquet")
 _AGAIN = "delete this file and run the study again: only its chunk is computed anew"
-
-
-@dataclass(frozen=True)
-class Manifest:
-    """What a store says about itself.
-
-    Attributes
-    ----------
-    scenario : str
-        The scenario as TOML.
-    vary : dict of str to dict
-        The sampler of every varied path, as a table.
-    seed, design, chunk, stream
-        Where the draws come from; ``chunk`` is the number of trials in a chunk, ``stream`` the version of the draws.
-    trials : int
-        The length of the longest study that was asked for.
-    stopped : int or None
-        The trials after which a stopping rule held.
-    columns : tuple of str
-        Names of the inputs.
-    version, created : str
-        The version of this library, and when the store was made (UTC).
-    environment : dict of str to str
-        What else the last bit of a draw may depend on: the machine, Python, NumPy and SciPy.
-    """
-
-    scenario: str
-    vary: dict[str, dict[str, Any]]
-    seed: int
-    design: str
-    trials: int
-    columns: tuple[str, ...]
-    stopped: int | None = None
-    chunk: int = CHUNK
-    stream: int = STREAM
-    version: str = _core.__version__
-    created: str = ""
-    environment: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def study(self) -> str:
-        """Digest of everything that decides an outcome: scenario, vary, seed, design, chunk and stream."""
-        decides = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
-        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
-
-    def to_json(self) -> str:
-        """The text of ``manifest.json``."""
-        content = {
-            "format": FORMAT,
-            "tadcore_version": self.version,
-            "created": self.created,
-            "environment": self.environment,
-            "study_sha256": self.study,
-            "scenario_sha256": hashlib.sha256(self.scenario.encode()).hexdigest(),
-            "stream": self.stream,
-            "seed": self.seed,
-            "design": self.design,
-            "chunk": self.chunk,
-            "trials": self.trials,
-            "stopped": self.stopped,
-            "columns": list(self.columns),
-            "vary": as_plain(self.vary),
-            "scenario": self.scenario,
-        }
-        return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-
-    @classmethod
-    def read(cls, folder: str | os.PathLike[str]) -> Manifest:
-        """The manifest of a store; raises `StoreError` where there is none that can be read."""
-        path = Path(folder) / "manifest.json"
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            if content["format"] != FORMAT:
-                found = f"it has format {content['format']}, and this version of tadcore reads {FORMAT}"
-                raise StoreError(str(path), found, "read it with the version that wrote it")
-            manifest = cls(
-                scenario=str(content["scenario"]),
-                vary=from_plain(dict(content["vary"])),
-                seed=int(content["seed"]),
-                design=str(content["design"]),
-                trials=int(content["trials"]),
-                columns=tuple(content["columns"]),
-                stopped=None if content["stopped"] is None else int(content["stopped"]),
-                chunk=int(content["chunk"]),
-                stream=int(content["stream"]),
-                version=str(content["tadcore_version"]),
-                created=str(content["created"]),
-                environment=dict(content["environment"]),
-            )
-        except FileNotFoundError:
-            raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
-        except OSError as error:
-            raise StoreError(str(path), f"it cannot be read ({_reason(error)})", "check the path") from None
-        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
-            raise StoreError(str(path), f"it is no manifest of a study ({error})", "name another folder") from None
-        if manifest.study != content.get("study_sha256"):
-            raise StoreError(str(path), "its digest does not fit its content: it was edited", "name another folder")
-        if manifest.chunk != CHUNK:  # what a part may hold at most: a stranger does not decide how much is read
-            found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
-            raise StoreError(str(path), found, "read it with the version that wrote it")
-        return manifest
 
 
 class Store:
@@ -216,11 +106,15 @@ class Store:
         """Rows of every part, by chunk; raises `StoreError` naming one that does not belong here."""
         rows: dict[int, int] = {}
         with _faults(self.folder):
-            found = sorted(self.folder.glob("part-*.parquet"))
-        for path in found:
+            parts = sorted(self.folder.glob("part-*.parquet"))
+        for path in parts:
             match = _PART.fullmatch(path.name)
             if match is None or path.name != self._part(int(match[1])).name:
                 raise StoreError(str(path), "its name is not that of a part", "move it out of this folder")
+            with _faults(path):
+                found = strange(path)
+            if found is not None:
+                raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
             rows[int(match[1])] = self._rows_of(path, int(match[1]))
         return rows
 
@@ -250,7 +144,7 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
     if not (place / "manifest.json").exists():
         if any(place.glob("part-*.parquet")):
             raise StoreError(str(place), "it holds parts but no manifest", "name another folder for the store")
-        return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=_environment())
+        return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=environment())
     there = Manifest.read(place)
     if there.study != wanted.study:
         decides = ("scenario", "vary", "seed", "design", "chunk", "stream")
@@ -260,11 +154,6 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
         found = f"it was written by tadcore {there.version}, and this is {wanted.version}"
         raise StoreError(str(place), found, "continue it with that version, read it with load_study, or start anew")
     return there
-
-
-def _environment() -> dict[str, str]:
-    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
-    return {"machine": platform.platform(), "python": platform.python_version(), **packages}
 
 
 def _write(path: Path, content: str | bytes) -> None:
@@ -280,10 +169,6 @@ def _faults(path: Path) -> Iterator[None]:
     except Timeout:
         raise
     except OSError as error:
-        found = f"it cannot be written or read ({_reason(error)})"
+        found = f"it cannot be written or read ({reason(error)})"
         remedy = "nothing that was finished is lost: make room or name a folder that can be written, and run again"
         raise StoreError(str(path), found, remedy) from error
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)

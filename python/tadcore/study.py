@@ -35,7 +35,9 @@ from ._arrays import as_index
 from ._chunks import Plan
 from ._collect import StoppingRule, collect, jobs_of
 from ._design import DESIGNS, Design
+from ._files import as_path
 from ._game import game_of
+from ._manifest import Manifest
 from ._progress import Progress
 from ._samplers import as_sampler
 from ._table import schema_of
@@ -45,7 +47,7 @@ from .errors import ScenarioError
 from .result import StudyResult, load_study
 from .sampling import Sampler
 from .scenario import Scenario
-from .store import Manifest, Store
+from .store import Store
 
 __all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
 
@@ -237,11 +239,13 @@ class Study:
         if until is not None and self.design != "random":
             rule = "left out: its interval needs independent draws, which only design='random' gives"
             raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
+        folder = None if store is None else as_path("store", store)
+        kept_table = None if table is None else as_path("table", table)
         self._plan.check_ahead(self.trials)
         game_of(self.scenario).equilibrium()
         schema = schema_of(self.columns)
-        opened = contextlib.nullcontext() if store is None else Store.writing(store, self._manifest(), schema)
-        with opened as kept, warm(self.scenario, table), Progress(self.trials, wanted=progress) as bar:
+        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), schema)
+        with opened as kept, warm(self.scenario, kept_table), Progress(self.trials, wanted=progress) as bar:
             trials = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
             return StudyResult(self, trials)
 

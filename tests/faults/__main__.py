@@ -160,6 +160,29 @@ def flipped(b):
     return spoiled(b, "flipped", change, 60, harmless=True)
 
 
+def manifest_changed(b):
+    """One byte becomes another, half of the times a digit another digit: nothing may be misread."""
+    folder, named, times = b.fresh("manifest", copy=True), 0, 400
+    path = folder / "manifest.json"
+    whole = path.read_bytes()
+    digits = [at for at, byte in enumerate(whole) if chr(byte).isdigit()]
+    for i in range(times):
+        at, data = b.rng.choice(digits) if i % 2 else b.rng.randrange(len(whole)), bytearray(whole)
+        others = b"0123456789" if i % 2 else bytes(range(256))
+        data[at] = b.rng.choice([other for other in others if other != whole[at]])
+        path.write_bytes(data)
+        try:
+            table = tadcore.load_study(folder).table
+        except StoreError as error:
+            insist(error.path == str(path), f"the error names {error.path}, not {path}")
+            named += 1
+        else:
+            insist(ipc(table) == b.bytes, f"byte {at} as {data[at]} was taken as whole")
+    path.write_bytes(whole)
+    b.same(folder)
+    return times, f"nothing; {named} of {times} reads refused, the others were right"
+
+
 def foreign(b):
     study(TRIALS, seed=8).run(store=b.place / "other", threads=1)
     strange = parts(b.place / "other")
@@ -211,6 +234,7 @@ FAULTS = {
     "a part truncated": truncated,
     "a foreign or misplaced part": foreign,
     "a bit flipped in a part": flipped,
+    "a byte changed in the manifest": manifest_changed,
     "a worker of a process pool killed": pool_worker,
     "a worker of a Dask cluster killed": dask_worker,
 }

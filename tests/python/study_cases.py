@@ -1,5 +1,7 @@
 """What the tests of studies share: a quick game, what varies in it, and callables that worker processes can import."""
 
+import hashlib
+import json
 import multiprocessing
 import os
 import signal
@@ -64,3 +66,18 @@ def lethal(rng, size):
 def parts(folder):
     """The bytes of every part of a store, by name."""
     return {path.name: path.read_bytes() for path in sorted(Path(folder).glob("part-*.parquet"))}
+
+
+def edited(folder, **changes):
+    """The manifest of a store with some entries changed, its digest left as it was."""
+    path = Path(folder) / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
+
+
+def resealed(folder, **changes):
+    """The manifest with some entries changed and its digest made right again, written down once more."""
+    path = Path(folder) / "manifest.json"
+    content = json.loads(path.read_text(encoding="utf-8")) | changes
+    del content["manifest_sha256"]
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    edited(folder, **changes, manifest_sha256=hashlib.sha256(canonical.encode()).hexdigest())

@@ -68,7 +68,7 @@ def test_bad_input_leaves_with_2_and_one_sentence(tadcore, tmp_path):
         ("gone.toml", "must be a file, or the name of a bundled scenario"),
         ("paper-l1", "did you mean paper-i1?"),
         (tmp_path, "must be a file"),
-        ("a\0b", "must be a file that can be read"),
+        ("a\0b", "must be a path"),
     ]:
         code, out, err = tadcore("validate", source)
         assert (code, out) == (2, "")

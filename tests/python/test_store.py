@@ -19,10 +19,10 @@ import pytest
 from scipy import stats
 
 import tadcore
-from study_cases import CHUNK, parts, ring, study
+from study_cases import CHUNK, edited, parts, resealed, ring, study
 from tadcore import StoreError
+from tadcore._manifest import Manifest
 from tadcore.sampling import Box, Choice
-from tadcore.store import Manifest
 
 HERE = Path(__file__).parent
 
@@ -251,19 +251,19 @@ def test_a_part_with_other_columns_or_rows_is_named(copied, drop, words):
         study().run(store=copied)
 
 
-def edited(folder, **changes):
-    path = folder / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
-
-
 def test_a_manifest_that_is_none_is_named(copied, tmp_path):
-    edited(copied, seed=8)
-    with pytest.raises(StoreError, match=r"manifest\.json: its digest does not fit its content"):
-        tadcore.load_study(copied)
-    edited(copied, seed=7, format=99)
-    with pytest.raises(StoreError, match="it has format 99"):
-        study().run(store=copied)
-    edited(copied, format=1, tadcore_version="0.0.1")
+    for use in (tadcore.load_study, lambda folder: study().run(store=folder)):
+        for changes in ({"seed": 8}, {"trials": 100}, {"stopped": 100}, {"columns": []}, {"tadcore_version": "0.0.1"}):
+            before = (copied / "manifest.json").read_bytes()
+            edited(copied, **changes)
+            with pytest.raises(StoreError, match=r"manifest\.json: its digest does not fit.*put back a copy"):
+                use(copied)
+            (copied / "manifest.json").write_bytes(before)
+    for other in (1, 99):
+        edited(copied, format=other)
+        with pytest.raises(StoreError, match=f"it has format {other}, and this version of tadcore reads 2; read"):
+            study().run(store=copied)
+    resealed(copied, format=2, tadcore_version="0.0.1")
     assert tadcore.load_study(copied).trials == study().trials
     with pytest.raises(StoreError, match=r"written by tadcore 0\.0\.1"):
         study().run(store=copied)

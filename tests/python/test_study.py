@@ -199,7 +199,7 @@ def test_results_are_frames(tmp_path):
         ("atacker.position", r"did you mean attacker\.position\?"),
         ("defenders.0.visibility", r"did you mean defenders\.0\.visibility_radius\?"),
         ("defender.*.position", r"did you mean defenders\.\*\.position\?"),
-        ("defenders.3.position", r"did you mean defenders\.\d\.position\?"),
+        ("defenders.3.position", r"of this game, which has 3 defenders, numbered from 0 to 2"),
         ("attacker.visibility_radius", "the path of a position or a radius"),
         ("target.capture_radius", "the path of a position or a radius"),
         ("attacker.position.z", "the path of a position or a radius"),

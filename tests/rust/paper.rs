@@ -209,3 +209,79 @@ fn players_move_by_their_velocities() {
         }
     }
 }
+
+/// J along a run from its recorded states alone, by the corrected trapezoid rule: with the slopes ℓ' of the integrand at
+/// both ends of a step, ∫ℓ = δ/2 (ℓ₀ + ℓ₁) + δ²/12 (ℓ₀' − ℓ₁') + O(δ⁵). No exponential and no series is in it; the
+/// free players' feedback is written out from P.
+fn costs_by_trapezoids(policy: &Policy, record: &Record) -> Vec<f64> {
+    type Plane = [f64; 2];
+    let (game, equilibrium) = (policy.game(), policy.equilibrium());
+    let (w, size, step) = (game.weights(), game.size(), game.grid().step());
+    let relative = |k: usize| -> Vec<Plane> {
+        let row = &record.positions[k * 2 * (size + 1)..(k + 1) * 2 * (size + 1)];
+        let attacker = [row[2 * size], row[2 * size + 1]];
+        (0..size).map(|i| [row[2 * i] - attacker[0], row[2 * i + 1] - attacker[1]]).collect()
+    };
+    let times =
+        |row: &[f64], z: &[Plane]| -> Plane { [0, 1].map(|x| row.iter().zip(z).map(|(g, v)| g * v[x]).sum::<f64>()) };
+    let dot = |u: Plane, v: Plane| u[0] * v[0] + u[1] * v[1];
+    let running = game.state_weights(false);
+    let mut total = vec![0.0; running.len()];
+    for k in 0..record.steps {
+        let mut rows: Vec<Vec<f64>> = record.gains[k * game.constrained() * size..(k + 1) * game.constrained() * size]
+            .chunks_exact(size)
+            .map(<[f64]>::to_vec)
+            .collect();
+        let first = game.interaction() == Interaction::I1;
+        if first {
+            rows.push(equilibrium.p(1, k)[(size - 1) * size..].iter().map(|x| -x / w.r_tau).collect());
+        }
+        let own = equilibrium.p(if first { 2 } else { 0 }, k);
+        rows.push((0..size).map(|j| (0..size).map(|i| own[i * size + j]).sum::<f64>() / w.r_a).collect());
+        // Of every objective the integrand and its slope along ż_i = u_i − u_a, at a state under the rows of this step.
+        let integrands = |z: &[Plane]| -> Vec<[f64; 2]> {
+            let u: Vec<Plane> = rows.iter().map(|row| times(row, z)).collect();
+            let moved: Vec<Plane> = (0..size).map(|i| [u[i][0] - u[size][0], u[i][1] - u[size][1]]).collect();
+            let turned: Vec<Plane> = rows.iter().map(|row| times(row, &moved)).collect();
+            let effort: Vec<[f64; 2]> = (0..=size).map(|i| [dot(u[i], u[i]), 2.0 * dot(u[i], turned[i])]).collect();
+            let of = |e: usize| {
+                let team: f64 = w.r_d.iter().zip(&effort).map(|(r, effort)| r * effort[e]).sum();
+                let (target, attacker) = (w.r_tau * effort[size - 1][e], w.r_a * effort[size][e]);
+                if first { vec![team, target, attacker] } else { vec![attacker - team - target] }
+            };
+            let state = |q: &[f64]| -> [f64; 2] {
+                let sum = |of: &dyn Fn(usize) -> f64| (0..size).map(|i| q[i] * of(i)).sum::<f64>();
+                [sum(&|i| dot(z[i], z[i])), sum(&|i| 2.0 * dot(z[i], moved[i]))]
+            };
+            let (values, slopes) = (of(0), of(1));
+            (0..running.len())
+                .map(|j| (state(&running[j]), j))
+                .map(|(s, j)| [s[0] + values[j], s[1] + slopes[j]])
+                .collect()
+        };
+        let ends = (integrands(&relative(k)), integrands(&relative(k + 1)));
+        for (total, (from, to)) in total.iter_mut().zip(ends.0.into_iter().zip(ends.1)) {
+            *total += 0.5 * (step / 2.0 * (from[0] + to[0]) + step * step / 12.0 * (from[1] - to[1]));
+        }
+    }
+    let z = relative(record.steps);
+    for (total, f) in total.iter_mut().zip(game.state_weights(true)) {
+        *total += 0.5 * (0..size).map(|i| f[i] * dot(z[i], z[i])).sum::<f64>();
+    }
+    total
+}
+
+#[test]
+fn costs_are_the_integrals_over_the_recorded_states() {
+    for (interaction, start) in
+        [(Interaction::I1, bank::paper_i1_limited()), (Interaction::I2, bank::paper_i2_limited())]
+    {
+        let policy = paper(interaction, 1.0);
+        let record = run(&policy, &start);
+        let (computed, expected) = (cost::costs(&policy, &record), costs_by_trapezoids(&policy, &record));
+        assert_eq!(computed.len(), expected.len());
+        for (a, b) in computed.iter().zip(&expected) {
+            assert!((a - b).abs() < 1e-8 * b.abs().max(1.0), "{interaction:?}: {a} and {b}");
+        }
+    }
+}
