@@ -5,11 +5,12 @@
 
 use super::dense;
 use super::doubled::Doubled;
-use super::newton::{Objective, Workspace, minimise};
+use super::newton::{Objective, minimise};
 use super::objective::RealGains;
 use super::problem::Problem;
 use super::start::Variable;
 use super::tasks::{Limits, Owner, Tasks};
+use super::workspace::Workspace;
 use crate::lanes::Number;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Eight, Four, Wide};

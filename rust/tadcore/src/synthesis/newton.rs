@@ -1,8 +1,8 @@
 //! Newton's method with the exact Hessian, damped by a multiple of the identity; several descents side by side.
 //!
-//! Each iteration factorises H + μ**I** with μ raised until the matrix is positive definite and the step pays (the ratio
-//! of actual to predicted decrease is positive), and lowered after good steps; with μ = 0 the last iterations converge
-//! quadratically. Where rounding hides the decrease of Θ, a step that lowers the gradient is taken instead. Every loop
+//! Each iteration factorises H + μ**I** with μ raised until the matrix is positive definite, the step is no longer than
+//! allowed and it pays (the ratio of actual to predicted decrease is positive), and lowered after good steps; with μ = 0 the
+//! last iterations converge quadratically. Where rounding hides the decrease of Θ, a step that lowers the gradient is taken instead. Every loop
 //! is bounded, and the bound met is a [`Status`].
 //!
 //! A list of descents is worked through in the lanes of a [`Number`]: each lane is at its own point, with its own μ, and
@@ -11,8 +11,9 @@
 //! of its neighbours, go in order.
 
 use super::dense;
-use super::start::{Layout, Variable};
+use super::start::Variable;
 use super::tasks::{Limits, Owner, Reached, Tasks};
+use super::workspace::Workspace;
 use crate::lanes::{Number, dot_in_order};
 
 /// A function of gains laid out as one vector of `width` entries.
@@ -39,74 +40,10 @@ const REST: f64 = 100.0;
 /// How fast predictions fall, from one step to the next, once Newton converges quadratically; in a narrow valley they
 /// fall slowly for hundreds of steps, and what they add up to cannot be foretold.
 const FALLING: f64 = 0.1;
-/// Damping tried per iteration before giving up; each raises μ fourfold.
+/// Damping tried per iteration before giving up.
 const DAMPINGS: f64 = 80.0;
 /// First damping, relative to the largest diagonal entry of the Hessian.
 const FIRST_DAMPING: f64 = 1e-3;
-
-/// Scratch that is reused from solve to solve.
-#[derive(Debug)]
-pub(super) struct Workspace<T: Number> {
-    pub(super) layout: Layout<T>,
-    pub(super) g: Vec<T>,
-    slope: Vec<T>,
-    trial: Vec<T>,
-    trial_slope: Vec<T>,
-    rival: Vec<T>,
-    pub(super) form: Vec<T>,
-    pub(super) hessian: Vec<T>,
-    pub(super) factor: Vec<T>,
-    gradient: Vec<T>,
-    step: Vec<T>,
-    other: Vec<T>,
-}
-
-impl<T: Number> Default for Workspace<T> {
-    fn default() -> Self {
-        let empty = Vec::new;
-        Self {
-            layout: Layout::default(),
-            g: empty(),
-            slope: empty(),
-            trial: empty(),
-            trial_slope: empty(),
-            rival: empty(),
-            form: empty(),
-            hessian: empty(),
-            factor: empty(),
-            gradient: empty(),
-            step: empty(),
-            other: empty(),
-        }
-    }
-}
-
-impl<T: Number> Workspace<T> {
-    /// Makes room for gains of `width` entries.
-    #[inline(always)]
-    pub(super) fn grow(&mut self, width: usize) {
-        let vectors = [
-            &mut self.g,
-            &mut self.slope,
-            &mut self.trial,
-            &mut self.trial_slope,
-            &mut self.rival,
-            &mut self.gradient,
-            &mut self.step,
-            &mut self.other,
-        ];
-        for vector in vectors {
-            if vector.len() < width {
-                vector.resize(width, T::splat(0.0));
-            }
-        }
-        for matrix in [&mut self.form, &mut self.hessian, &mut self.factor] {
-            if matrix.len() < width * width {
-                matrix.resize(width * width, T::splat(0.0));
-            }
-        }
-    }
-}
 
 /// First damping after a step that did not pay, relative likewise.
 const FIRST_REJECTED: f64 = 1e-2;

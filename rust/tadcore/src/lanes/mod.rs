@@ -1,0 +1,158 @@
+//! Numbers side by side: one, or four in each vector register.
+//!
+//! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the IEEE one on
+//! each lane, the fused ones too, so a lane gives the bits that the number alone would give. The methods of the wide
+//! types are inlined into functions that are compiled for their instructions; a closure is a function of its own and is
+//! not, so kernels over `Number` are plain loops.
+
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use std::ops::{Add, Div, Mul, Sub};
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Eight, Four, Wide};
+
+/// One number, or several side by side.
+pub(crate) trait Number:
+    Copy + std::fmt::Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// How many, at most eight.
+    const LANES: usize;
+    /// A yes or no for each lane.
+    type Mask: Copy + std::fmt::Debug;
+
+    /// The same number in all lanes.
+    fn splat(x: f64) -> Self;
+    /// The number in one lane.
+    fn lane(&self, lane: usize) -> f64;
+    /// Replaces the number in one lane.
+    fn set_lane(&mut self, lane: usize, x: f64);
+    /// self + x·y, rounded once.
+    fn plus(self, x: Self, y: Self) -> Self;
+    /// self − x·y, rounded once.
+    fn minus(self, x: Self, y: Self) -> Self;
+    fn sqrt(self) -> Self;
+    fn abs(self) -> Self;
+    /// Where a < b; no where one is no number.
+    fn less(self, other: Self) -> Self::Mask;
+    /// Where a ≤ b; no where one is no number.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask says so, elsewhere `no`.
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// A mask from its bits, lane 0 the lowest.
+    fn mask(bits: u8) -> Self::Mask;
+    /// A mask as bits.
+    fn bits(mask: Self::Mask) -> u8;
+    /// The numbers as they are, where there is one lane.
+    fn alone(_numbers: &mut [Self]) -> Option<&mut [f64]> {
+        None
+    }
+
+    /// The larger one; the first where one is no number.
+    #[inline(always)]
+    fn or_larger(self, other: Self) -> Self {
+        Self::select(self.less(other), other, self)
+    }
+}
+
+/// √Σx².
+#[inline(always)]
+pub(crate) fn norm<T: Number>(numbers: &[T]) -> T {
+    sum_of_squares(numbers).sqrt()
+}
+
+/// Σx².
+#[inline(always)]
+pub(crate) fn sum_of_squares<T: Number>(numbers: &[T]) -> T {
+    dot(numbers, numbers)
+}
+
+/// Σxy, in four sums that do not wait for one another: for lengths that are the same for all lanes and neighbours.
+#[inline(always)]
+pub(crate) fn dot<T: Number>(x: &[T], y: &[T]) -> T {
+    let (mut s0, mut s1, mut s2, mut s3) = (T::splat(0.0), T::splat(0.0), T::splat(0.0), T::splat(0.0));
+    let len = x.len();
+    let y = &y[..len];
+    let mut i = 0;
+    while i + 4 <= len {
+        s0 = s0.plus(x[i], y[i]);
+        s1 = s1.plus(x[i + 1], y[i + 1]);
+        s2 = s2.plus(x[i + 2], y[i + 2]);
+        s3 = s3.plus(x[i + 3], y[i + 3]);
+        i += 4;
+    }
+    while i < len {
+        s0 = s0.plus(x[i], y[i]);
+        i += 1;
+    }
+    (s0 + s1) + (s2 + s3)
+}
+
+/// Σxy, one after another: zeros between the terms change nothing.
+#[inline(always)]
+pub(crate) fn dot_in_order<T: Number>(x: &[T], y: &[T]) -> T {
+    let mut sum = T::splat(0.0);
+    for (&x, &y) in x.iter().zip(y) {
+        sum = sum.plus(x, y);
+    }
+    sum
+}
+
+impl Number for f64 {
+    const LANES: usize = 1;
+    type Mask = bool;
+
+    #[inline(always)]
+    fn splat(x: f64) -> f64 {
+        x
+    }
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> f64 {
+        *self
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _lane: usize, x: f64) {
+        *self = x;
+    }
+    #[inline(always)]
+    fn plus(self, x: f64, y: f64) -> f64 {
+        x.mul_add(y, self)
+    }
+    #[inline(always)]
+    fn minus(self, x: f64, y: f64) -> f64 {
+        (-x).mul_add(y, self)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn abs(self) -> f64 {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn less(self, other: f64) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn at_most(self, other: f64) -> bool {
+        self <= other
+    }
+    #[inline(always)]
+    fn select(mask: bool, yes: f64, no: f64) -> f64 {
+        if mask { yes } else { no }
+    }
+    #[inline(always)]
+    fn mask(bits: u8) -> bool {
+        bits & 1 == 1
+    }
+    #[inline(always)]
+    fn bits(mask: bool) -> u8 {
+        u8::from(mask)
+    }
+    #[inline(always)]
+    fn alone(numbers: &mut [f64]) -> Option<&mut [f64]> {
+        Some(numbers)
+    }
+}

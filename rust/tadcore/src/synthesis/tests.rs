@@ -1,0 +1,125 @@
+//! Derivatives against differences, the value against its terms, and lanes against one number.
+
+use super::doubled::Doubled;
+use super::newton::Objective;
+use super::objective::RealGains;
+use super::*;
+use crate::game::Interaction;
+use crate::width::Width;
+
+fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
+    let width = objective.width();
+    let h = 1e-5;
+    let (mut gradient, mut hessian) = (vec![0.0; width], vec![0.0; width * width]);
+    objective.value(g);
+    objective.gradient(g, &mut gradient);
+    objective.keep(true);
+    objective.hessian(g, &mut hessian);
+    for a in 0..width {
+        let mut probe = |shift: f64| {
+            let mut p = g.to_vec();
+            p[a] += shift;
+            let mut slope = vec![0.0; width];
+            let value = objective.value(&p);
+            objective.gradient(&p, &mut slope);
+            (value, slope)
+        };
+        let ((above, up), (below, down)) = (probe(h), probe(-h));
+        let slope = (above - below) / (2.0 * h);
+        assert!((slope - gradient[a]).abs() < 1e-6 * (1.0 + slope.abs()), "gradient {a}");
+        for b in 0..=a {
+            let curve = (up[b] - down[b]) / (2.0 * h);
+            assert!((curve - hessian[a * width + b]).abs() < 1e-5 * (1.0 + curve.abs()), "hessian {a} {b}");
+        }
+    }
+}
+
+fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {
+    let (size, groups) = if interaction == Interaction::I1 { (4, 3) } else { (3, 1) };
+    let mut seed = 0.3f64;
+    let mut next = || {
+        seed = (seed * 37.77 + 0.123).fract();
+        seed - 0.5
+    };
+    let mut p = vec![0.0; groups * size * size];
+    for matrix in p.chunks_exact_mut(size * size) {
+        for a in 0..size {
+            for b in 0..=a {
+                matrix[a * size + b] = 2.0 * next();
+                matrix[b * size + a] = matrix[a * size + b];
+            }
+        }
+    }
+    let gamma = [0.4, 0.3, 0.2, 0.6][..interaction.terms()].to_vec();
+    let problem = Problem::from_parts(interaction, vec![0.7, 1.3, 0.9], gamma, &p);
+    let g = (0..2 * 3 * size).map(|_| next()).collect();
+    (problem, p, g)
+}
+
+#[test]
+fn derivatives_match_differences() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, _, g) = sample(interaction);
+        check(&mut RealGains::<f64, 0>::new(&problem), &g[..g.len() / 2]);
+        for complex in [true, false] {
+            let mut doubled = Doubled::<f64, 0>::new(&problem);
+            doubled.set_lane(0, complex, 1.0);
+            check(&mut doubled, &g);
+        }
+    }
+}
+
+/// Every width, alone and with neighbours, on networks from empty to complete: the same bits.
+#[test]
+fn neighbours_and_width_change_nothing() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, _, _) = sample(interaction);
+        let (m, n) = (problem.rows(), problem.size());
+        let topologies: Vec<Topology> = (0..1u64 << (m * n))
+            .step_by(if m * n > 9 { 29 } else { 3 })
+            .map(|bits| Topology::from_words(m, n, &[bits]))
+            .collect();
+        let solve = |width, topologies: &[Topology]| {
+            let mut solver = Synthesizer { engine: Engine::of(width), tasks: Tasks::default() };
+            let mut all = Vec::new();
+            solver.solve_all(&problem, topologies, Options::default(), |_, gains| all.push(gains));
+            all
+        };
+        let alone: Vec<Gains> =
+            topologies.iter().flat_map(|topology| solve(Width::Baseline, std::slice::from_ref(topology))).collect();
+        assert!(alone.iter().any(|gains| !gains.certified), "no network needs a further look");
+        for width in Width::all() {
+            assert_eq!(solve(width, &topologies), alone, "{width:?}");
+            for (topology, gains) in topologies.iter().zip(&alone) {
+                assert_eq!(&solve(width, std::slice::from_ref(topology))[0], gains, "{width:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_value_is_the_weighted_sum_of_the_terms() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, p, g) = sample(interaction);
+        let g = &g[..g.len() / 2];
+        let value = RealGains::<f64, 0>::new(&problem).value(g);
+        let sum = problem.weigh(&problem.terms(&p, g));
+        assert!((sum - value).abs() < 1e-12 * value);
+    }
+}
+
+#[test]
+fn who_sees_no_one_has_no_gain_and_who_sees_all_plays_the_equilibrium() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, _, _) = sample(interaction);
+        let (m, n) = (problem.rows(), problem.size());
+        let mut solver = Synthesizer::new();
+        let blind = solver.solve(&problem, &Topology::empty(m, n), Options::default());
+        assert!(blind.rows.iter().all(|&g| g == 0.0) && blind.certified);
+        let full = solver.solve(&problem, &Topology::complete(m, n), Options::default());
+        assert!(full.theta < 1e-24 && full.certified);
+        for (g, f) in full.rows.iter().zip(problem.fne()) {
+            assert!((g - f).abs() < 1e-12);
+        }
+    }
+}
