@@ -99,6 +99,14 @@ pub(crate) fn dot_in_order<T: Number>(x: &[T], y: &[T]) -> T {
     sum
 }
 
+/// to := from, in the lanes of a mask.
+#[inline(always)]
+pub(crate) fn take<T: Number>(lanes: T::Mask, from: &[T], to: &mut [T]) {
+    for (to, &x) in to.iter_mut().zip(from) {
+        *to = T::select(lanes, x, *to);
+    }
+}
+
 impl Number for f64 {
     const LANES: usize = 1;
     type Mask = bool;

@@ -20,7 +20,7 @@
 use super::newton::Objective;
 use super::objective::{add_product, add_weighted, symmetric_product};
 use super::problem::Problem;
-use crate::lanes::{Number, dot, norm, sum_of_squares};
+use crate::lanes::{Number, dot, norm, sum_of_squares, take};
 
 /// Θ over doubled gains.
 pub(super) struct Doubled<'a, T, const N: usize> {
@@ -154,9 +154,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
 
     #[inline(always)]
     fn keep(&mut self, lanes: T::Mask) {
-        for (kept, &x) in self.kept.iter_mut().zip(&self.x) {
-            *kept = T::select(lanes, x, *kept);
-        }
+        take(lanes, &self.x, &mut self.kept);
     }
 
     /// With f = 4γ₁r_ir_j and the constant parts Q± = 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I**:

@@ -14,7 +14,7 @@ use super::dense;
 use super::start::Variable;
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
-use crate::lanes::{Number, dot_in_order};
+use crate::lanes::{Number, dot_in_order, take};
 
 /// A function of gains laid out as one vector of `width` entries.
 pub(super) trait Objective<T: Number> {
@@ -222,12 +222,8 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             let taken = accepted | fresh;
             if taken != 0 {
                 let mask = T::mask(taken);
-                for (g, &x) in g.iter_mut().zip(trial.iter()) {
-                    *g = T::select(mask, x, *g);
-                }
-                for (f, &x) in full.iter_mut().zip(trial_slope.iter()) {
-                    *f = T::select(mask, x, *f);
-                }
+                take(mask, trial, g);
+                take(mask, trial_slope, full);
                 objective.keep(mask);
                 s.value = T::select(mask, value, s.value);
                 s.slope = T::select(mask, slope, s.slope);

@@ -14,7 +14,7 @@
 
 use super::newton::Objective;
 use super::problem::Problem;
-use crate::lanes::{Number, dot, norm, sum_of_squares};
+use crate::lanes::{Number, dot, norm, sum_of_squares, take};
 
 /// Θ over gains, for one network or several side by side. `N` is the size, 0 when it is known only at run time.
 pub(super) struct RealGains<'a, T, const N: usize> {
@@ -130,9 +130,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
 
     #[inline(always)]
     fn keep(&mut self, lanes: T::Mask) {
-        for (kept, &x) in self.kept.iter_mut().zip(&self.x) {
-            *kept = T::select(lanes, x, *kept);
-        }
+        take(lanes, &self.x, &mut self.kept);
     }
 
     #[inline(always)]
