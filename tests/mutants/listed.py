@@ -305,5 +305,6 @@ MUTANTS = {
 # Mutants that no test can tell from the program: (file, formula): why.
 EQUIVALENT = {
     ("synthesis/problem.rs", "W_p: sign"): "Θ, its derivatives and the certificate hold W_p twice in every product",
+    ("cost/mod.rs", "J: Horner"): "it reverses z from one end of a step to the other, and costs are quadratic in z",
     ("network/visibility.rs", "rounded root, down"): "the next loop climbs back to the same number",
 }
