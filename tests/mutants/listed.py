@@ -227,7 +227,7 @@ MUTANTS = {
         ("constant part, diagonal", "let diagonal = «4.0 * gram[i * m + j] + own»;", "4.0 * gram[i * m + j] - own"),
         ("constant part, w_jᵀw_i", "let factor = «4.0 * sign * w[j * n + a]»;", "-4.0 * sign * w[j * n + a]"),
     ],
-    "lanes.rs": [
+    "lanes/mod.rs": [
         ("Σxy, second of four sums", "s1 = «s1.plus(x[i + 1], y[i + 1])»;", "s1.minus(x[i + 1], y[i + 1])"),
         ("Σxy, the rest", "while i < len {\n        s0 = «s0.plus(x[i], y[i])»;", "s0.minus(x[i], y[i])"),
         ("Σxy, all four", "(s0 + s1) + («s2 + s3»)", "s2 - s3"),
@@ -236,6 +236,9 @@ MUTANTS = {
         ("one: a − xy", "«(-x).mul_add(y, self)»", "x.mul_add(y, self)"),
         ("one: a < b", "{\n        «self < other»", "self > other"),
         ("one: a ≤ b", "«self <= other»", "self < other"),
+        ("Σxy in order", "sum = «sum.plus(x, y)»;", "sum.minus(x, y)"),
+    ],
+    "lanes/x86.rs": [
         (
             "256 bits: a + xy",
             "«_mm256_fmadd_pd(x.0[r], y.0[r], self.0[r])»",
@@ -269,7 +272,7 @@ MUTANTS = {
     ],
     "synthesis/objective.rs": [
         ("Θ: −M", "*x = «T::splat(-t)»;", "T::splat(t)"),
-        ("Θ: GᵀRG", "«x[a * n + b].plus(factor, gi[b])»", "x[a * n + b].minus(factor, gi[b])"),
+        ("Θ: GᵀRG", "«x.plus(factor, g)»", "x.minus(factor, g)"),
         ("Θ: Δ", "«gi[a] - T::splat(fne[i * n + a])»", "gi[a] + T::splat(fne[i * n + a])"),
         (
             "Θ: c‖Δ‖²",
@@ -282,8 +285,8 @@ MUTANTS = {
             "«rest.plus(T::splat(p.gamma[0]), quartic)»",
             "rest.minus(T::splat(p.gamma[0]), quartic)",
         ),
-        ("Θ: W_pΔ", "«e[a * n + b].plus(factor, delta[i * n + b])»", "e[a * n + b].minus(factor, delta[i * n + b])"),
-        ("Θ: W_pΔ, first row", "«T::splat(w[a]) * delta[b]»", "T::splat(-w[a]) * delta[b]"),
+        ("Θ: W_pΔ", "«e.plus(factor, d)»", "e.minus(factor, d)"),
+        ("Θ: W_pΔ, first row", "«T::splat(w[a]) * d»", "T::splat(-w[a]) * d"),
         ("Θ: E_p below the diagonal", "«low.plus(sign, high)»", "low.minus(sign, high)"),
         ("Θ: E_p above the diagonal", "«high.plus(sign, low)»", "high.minus(sign, low)"),
         ("∇Θ: cΔ", "T::splat(«2.0 * p.closeness[i]»)", "-2.0 * p.closeness[i]"),
@@ -316,9 +319,9 @@ MUTANTS = {
         ("doubled: s", "f64::from(u8::from(«complex»))", "!complex"),
         ("doubled: σ", "if «complex» { -1.0 } else { 1.0 }", "!complex"),
         ("doubled: −M", "*x = «T::splat(-t)»;", "T::splat(t)"),
-        ("doubled: X_r, AᵀRA", "real[a * n + b].plus(fa, «ai[b]»)", "T::splat(0.0) - ai[b]"),
+        ("doubled: X_r, AᵀRA", "real[b].plus(fa, «ai[b]»)", "T::splat(0.0) - ai[b]"),
         ("doubled: X_r, BᵀRB", ".plus(fa, ai[b]).plus(fb, «bi[b]»)", "T::splat(0.0) - bi[b]"),
-        ("doubled: X_i, AᵀRB", "imaginary[a * n + b].plus(fa, «bi[b]»)", "T::splat(0.0) - bi[b]"),
+        ("doubled: X_i, AᵀRB", "imaginary[b].plus(fa, «bi[b]»)", "T::splat(0.0) - bi[b]"),
         ("doubled: X_i, BᵀRA", ".plus(fa, bi[b]).minus(fb, «ai[b]»)", "T::splat(0.0) - ai[b]"),
         ("doubled: X_i, s", "*x = «self.complex * *x»;", "*x"),
         ("doubled: Δ", "«ai[a] - T::splat(p.fne[i * n + a])»", "ai[a] + T::splat(p.fne[i * n + a])"),
@@ -364,17 +367,25 @@ MUTANTS = {
         ("doubled: Hessian AA, b_jᵀb_i", ".plus(fa, ai[b]).minus(sb, «bi[b]»)", "T::splat(0.0) - bi[b]"),
         ("doubled: Hessian AA, AAᵀ + sBBᵀ", "f * («aa + s * bb»)", "aa - s * bb"),
         ("doubled: Hessian AA, **I**", "«h[a] + of_a»", "h[a] - of_a"),
-        ("doubled: Hessian AA, X_r", "upper[at] = «upper[at].plus(own, r)»;", "upper[at].minus(own, r)"),
+        (
+            "doubled: Hessian AA, X_r",
+            "upper[at..][..n].iter_mut().zip(xr) {\n                    *h = «h.plus(own, x)»;",
+            "h.minus(own, x)",
+        ),
         ("doubled: Hessian BB, b_jᵀb_i", "q.plus(fb, «bi[b]»)", "T::splat(0.0) - bi[b]"),
         ("doubled: Hessian BB, a_jᵀa_i", ".plus(fb, bi[b]).minus(sa, «ai[b]»)", "T::splat(0.0) - ai[b]"),
         ("doubled: Hessian BB, BBᵀ + sAAᵀ", "f * («bb + s * aa»)", "bb - s * aa"),
         ("doubled: Hessian BB, **I**", "«h[a] + of_b»", "h[a] - of_b"),
-        ("doubled: Hessian BB, X_r", "«lower[at + half].plus(own, r)»", "lower[at + half].minus(own, r)"),
+        (
+            "doubled: Hessian BB, X_r",
+            "lower[at + half..][..n].iter_mut().zip(xr) {\n                    *h = «h.plus(own, x)»;",
+            "h.minus(own, x)",
+        ),
         ("doubled: Hessian BB, Q_σ", "«T::splat(0.0).less(self.sign)»", "self.sign.less(T::splat(0.0))"),
         ("doubled: Hessian BA", "«(fa * bi[b]).plus(sb, ai[b])»", "(fa * bi[b]).minus(sb, ai[b])"),
         ("doubled: Hessian BA, BAᵀ − sABᵀ", "«dot(bi, aj) - s * dot(ai, bj)»", "dot(bi, aj) + s * dot(ai, bj)"),
         ("doubled: Hessian BA, **I**", "«h[a] + cross»", "h[a] - cross"),
-        ("doubled: Hessian BA, X_i", "«lower[at].minus(own, i)»", "lower[at].plus(own, i)"),
+        ("doubled: Hessian BA, X_i", "«h.minus(own, x)»", "h.plus(own, x)"),
     ],
     "synthesis/dense.rs": [
         ("H + μI, alone", "«l[i * d + i] + damping»", "l[i * d + i] - damping"),
@@ -412,8 +423,8 @@ MUTANTS = {
         ("actual decrease", "let actual = «s.value - value»;", "value - s.value"),
         (
             "predicted decrease",
-            "«dot(step, gradient) - s.damping * length2»",
-            "dot(step, gradient) + s.damping * length2",
+            "«dot_in_order(step, gradient) - s.damping * length2»",
+            "dot_in_order(step, gradient) + s.damping * length2",
         ),
         ("predicted decrease, −½", "predicted = T::splat(«-0.5»)", "0.5"),
         ("a step that pays", "«(T::splat(1e-4) * predicted).less(actual)»", "actual.less(T::splat(1e-4) * predicted)"),
@@ -427,8 +438,8 @@ MUTANTS = {
         ),
         (
             "damping for a length",
-            "«s.damping + length2 / sum_of_squares(w_step) * excess»",
-            "s.damping - length2 / sum_of_squares(w_step) * excess",
+            "«s.damping + length2 / dot_in_order(w_step, w_step) * excess»",
+            "s.damping - length2 / dot_in_order(w_step, w_step) * excess",
         ),
         (
             "damping for a length: excess",
