@@ -43,7 +43,7 @@ MUTANTS = {
         ),
         ("I1: G + Gᵀ above the diagonal", "std::array::from_fn(|c| «sum[c][r]»)", "sum[r][c]"),
         ("I1: Q", "«out[i * L + i] += q;»", "out[i * L + i] -= q;"),
-        ("I1: P_p 1", "«sum[c] + row[c]»", "sum[c] - row[c]"),
+        ("I1: P_p 1", "«sum[c] + row[c]»", "row[c]"),
         ("I1: P(T) = F", "y[diagonal(i)] = «v»;", "-v"),
     ],
     "riccati/large.rs": [
@@ -59,7 +59,7 @@ MUTANTS = {
         (
             "I1, large: P_p 1, its terms",
             "sum[r] = «sum[r].add(V::Eight::load(&four[r]))»;",
-            "sum[r].sub(V::Eight::load(&four[r]))",
+            "V::Eight::load(&four[r])",
         ),
         ("I1, large: pᵀ μ, once", "sum = add(«left(p)», right(m), sum);", "left(m)"),
         ("I1, large: pᵀ μ", "sum = add(«left(pi)», right(mj), sum);", "left(mi)"),
