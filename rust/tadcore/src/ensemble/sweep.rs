@@ -292,6 +292,19 @@ mod tests {
             let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
             let (compiled, ends) = observe::<Plain, 3, 2, 2>(&z, &sight, &capture);
             assert_eq!((keys[0], caught), (compiled, u32::from(ends)));
+            // With nothing on the shelf a sweep stops with what it saw, or with whom it caught.
+            let nothing = [-1.0; LANES];
+            for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
+                let expected = if caught == 0 { Stop::Missing(0) } else { Stop::Caught(0, caught) };
+                for width in Width::all() {
+                    let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
+                    let mut strips = Strips { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
+                    let mut seen = vec![[0; LANES]];
+                    let stop = sweep_of(&shape, width)(&shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
+                    assert_eq!(stop, expected, "{width:?}");
+                    assert!(caught != 0 || seen == keys, "{width:?}");
+                }
+            }
             for l in 0..LANES {
                 let state: Vec<f64> = z.iter().map(|lane| lane[l]).collect();
                 let mut topology = Topology::empty(2, 3);

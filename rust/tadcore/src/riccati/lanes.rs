@@ -164,3 +164,41 @@ fused! {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::width::Width;
+
+    /// Points, error sums, dense output and its values have the same bits for every vector width.
+    #[test]
+    fn widths_agree_to_the_bit() {
+        let len = 3 * LANES;
+        let wave = |count: usize, shift: f64| (0..count).map(|i| (shift + 1.7 * i as f64).sin()).collect::<Vec<f64>>();
+        let (y, y_new, k, weight) = (wave(len, 0.1), wave(len, 0.2), wave(STAGES * len, 0.3), wave(len, 0.4));
+        let values = |width: Width| {
+            let mut all = Vec::new();
+            for i in 1..STAGES {
+                let mut out = vec![0.0; len];
+                point(width, i, &mut out, &y, &k, 0.37);
+                all.extend(out);
+            }
+            let (five, three, size) = error_sums(width, &k, &y, &weight, LANES, 2 * LANES);
+            let (mut coefficients, mut inside) = (vec![0.0; DENSE * len], vec![0.0; 4 * len]);
+            dense(width, &mut coefficients, &y, &y_new, &k, 0.37);
+            interpolate(width, &mut inside, &y, &coefficients, [0.1, 0.4, 0.7, 1.0]);
+            // At θ = 1 the dense output is the new point.
+            for (a, b) in inside[3 * len..].iter().zip(&y_new) {
+                assert!((a - b).abs() < 1e-15, "{width:?}: {a} and {b}");
+            }
+            all.extend([five, three, size]);
+            all.extend(coefficients);
+            all.extend(inside);
+            all
+        };
+        let expected = values(Width::Baseline);
+        for width in Width::all() {
+            assert_eq!(values(width), expected, "{width:?}");
+        }
+    }
+}

@@ -82,6 +82,9 @@ mod tests {
         let (mut sizes, mut w) = ([0.0; 2], [0.0; 4]);
         whole(&[16.0, -2.0, -2.0, 4.0], 2, &mut sizes, &mut w);
         assert_eq!(w, [1.0 / 16.0, 1.0 / 8.0, 1.0 / 8.0, 1.0 / 4.0]);
+        // The largest entry may be a negative one.
+        whole(&[1.0, -16.0, -16.0, 4.0], 2, &mut sizes, &mut w);
+        assert_eq!(w, [1.0 / 16.0; 4]);
         whole(&[4000.0, 0.0, 0.0, 1e-9], 2, &mut sizes, &mut w);
         assert!((w[3] - 0.25).abs() < 1e-15 && (w[0] * 4000.0 - 1.0).abs() < 1e-15);
     }
