@@ -123,3 +123,62 @@ fn who_sees_no_one_has_no_gain_and_who_sees_all_plays_the_equilibrium() {
         }
     }
 }
+
+/// Θ over doubled gains by its definition: complex arithmetic, or a stack whose second part is compared with nothing.
+fn by_definition(problem: &Problem, g: &[f64], complex: bool) -> f64 {
+    type C = (f64, f64);
+    let (n, m) = (problem.size, problem.rows);
+    let (a, b) = g.split_at(m * n);
+    let square = |(x, y): C| x * x + y * y;
+    let product = |(x, y): C, (u, v): C| (x * u - y * v, x * v + y * u);
+    let mut sum = 0.0;
+    for p in 0..n {
+        for q in 0..n {
+            let mut x = (-problem.target[p * n + q], 0.0);
+            for i in 0..m {
+                let (gp, gq) = ((a[i * n + p], b[i * n + p]), (a[i * n + q], b[i * n + q]));
+                let term = product((gp.0, -gp.1), gq);
+                x = (x.0 + problem.r[i] * term.0, x.1 + problem.r[i] * if complex { term.1 } else { 0.0 });
+            }
+            sum += problem.gamma[0] * square(x);
+        }
+    }
+    let delta = |i: usize, q: usize| (a[i * n + q] - problem.fne[i * n + q], b[i * n + q]);
+    for w in &problem.coupling {
+        for p in 0..n {
+            for q in 0..n {
+                let (mut e, mut turned) = ((0.0, 0.0), (0.0, 0.0));
+                for i in 0..m {
+                    let (d, t) = (delta(i, q), delta(i, p));
+                    e = (e.0 + w[i * n + p] * d.0, e.1 + w[i * n + p] * d.1);
+                    turned = (turned.0 + w[i * n + q] * t.0, turned.1 + w[i * n + q] * t.1);
+                }
+                let sign = if complex { -1.0 } else { 1.0 };
+                sum += square((e.0 + turned.0, e.1 + sign * turned.1));
+            }
+        }
+    }
+    for i in 0..m {
+        for q in 0..n {
+            sum += problem.closeness[i] * square(delta(i, q));
+        }
+    }
+    sum
+}
+
+#[test]
+fn doubled_gains_are_complex_or_stacked() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, _, g) = sample(interaction);
+        for complex in [true, false] {
+            let mut doubled = Doubled::<f64, 0>::new(&problem);
+            doubled.set_lane(0, complex, 1.0);
+            let (value, expected) = (doubled.value(&g), by_definition(&problem, &g, complex));
+            assert!((value - expected).abs() < 1e-12 * expected, "{interaction:?} {complex}: {value} {expected}");
+            let mut flat = g.clone();
+            flat[g.len() / 2..].fill(0.0);
+            let real = RealGains::<f64, 0>::new(&problem).value(&flat[..g.len() / 2]);
+            assert!((doubled.value(&flat) - real).abs() < 1e-12 * real, "{interaction:?} {complex}");
+        }
+    }
+}
