@@ -448,8 +448,8 @@ MUTANTS = {
         ),
         ("longest step", "«length2.at_most(T::splat(limits.longest * limits.longest))»", "length2.at_most(length2)"),
         ("step of the lanes that move", "*s = «T::select(mask, *s, zero)»;", "*s"),
-        ("point of the lanes that moved", "*g = «T::select(mask, x, *g)»;", "x"),
-        ("gradient of the lanes that moved", "*f = «T::select(mask, x, *f)»;", "x"),
+        ("point of the lanes that moved", "«take(mask, trial, g)»;", "g.copy_from_slice(trial)"),
+        ("gradient of the lanes that moved", "«take(mask, trial_slope, full)»;", "full.copy_from_slice(trial_slope)"),
         (
             "flat enough",
             "«s.slope.at_most(T::splat(limits.tolerance) * s.scale)»",
