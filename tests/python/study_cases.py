@@ -1,8 +1,8 @@
 """What the tests of studies share: a quick game, what varies in it, and callables that worker processes can import."""
 
+import contextlib
 import hashlib
 import json
-import contextlib
 import multiprocessing
 import os
 import signal
