@@ -11,7 +11,8 @@ RUSTDOC := -D warnings --html-in-header $(CURDIR)/rust/tadcore/katex.html
 RUST    := $(shell find rust -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-rust test-python heavy faults fuzz sanitize mutants audit lint format bench peers images docs wheel sdist check clean
+.PHONY: help setup demo test test-rust test-python heavy faults fuzz sanitize mutants audit lint format bench peers images \
+        docs wheel sdist check clean
 
 help:  ## list the targets
 	@echo "tadcore: target-attacker-defender games with limited observations"

@@ -1,9 +1,9 @@
 //! Newton's method with the exact Hessian, damped by a multiple of the identity; several descents side by side.
 //!
 //! Each iteration factorises H + μ**I** with μ raised until the matrix is positive definite, the step is no longer than
-//! allowed and it pays (the ratio of actual to predicted decrease is positive), and lowered after good steps; with μ = 0 the
-//! last iterations converge quadratically. Where rounding hides the decrease of Θ, a step that lowers the gradient is taken instead. Every loop
-//! is bounded, and the bound met is a [`Status`].
+//! allowed and it pays (the ratio of actual to predicted decrease is positive), and lowered after good steps; with μ = 0
+//! the last iterations converge quadratically. Where rounding hides the decrease of Θ, a step that lowers the gradient is
+//! taken instead. Every loop is bounded, and the bound met is a [`Status`](super::Status).
 //!
 //! A list of descents is worked through in the lanes of a [`Number`]: each lane is at its own point, with its own μ, and
 //! takes the next descent of the list when its own has ended. No lane sees another, so what a descent gives does not
@@ -44,7 +44,6 @@ const FALLING: f64 = 0.1;
 const DAMPINGS: f64 = 80.0;
 /// First damping, relative to the largest diagonal entry of the Hessian.
 const FIRST_DAMPING: f64 = 1e-3;
-
 /// First damping after a step that did not pay, relative likewise.
 const FIRST_REJECTED: f64 = 1e-2;
 /// Length aimed at where a step was too long, relative to the longest, and the least by which μ is then raised.
