@@ -195,7 +195,7 @@ impl Search<'_> {
     /// Descends in doubled gains, and lists the starts that come of it and those without one row: the look of each.
     fn double<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
         let (n, m) = (self.problem.size, self.problem.rows);
-        let scale = norm(&self.problem.fne);
+        let scale = self.problem.scale.fne;
         self.start(2);
         for &e in open {
             for complex in [true, false] {
