@@ -2,9 +2,10 @@
 
     python tests/mutants [--only WORD …]
 
-Copies the sources, writes every mutant of `listed.py` beside the original behind a switch, builds the tests once and
-runs them once per mutant, the quick ones first, up to the first failure. Prints a table: file, formula, the test that
-failed. Leaves with 1 if a mutant survives and `listed.py` does not say why, or if the tests fail without any mutant.
+Copies the sources and, room by room, writes its mutants of `listed.py` beside the original behind a switch, builds the
+tests and runs them once per mutant, the quick ones first, up to the first failure. Prints a table: file, formula, the
+test that failed. Leaves with 1 if a mutant survives and `listed.py` does not say why, or if the tests fail without any
+mutant.
 """
 
 import argparse
@@ -138,43 +139,52 @@ def run(program, tree, number, limit):
     return failed, ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
 
 
+def verdict(found, tests, programs, tree, limits):
+    """What a mutant's table row says, and whether that is as it should be."""
+    number, file, formula, *_ = found
+    for name in sorted(tests, key=lambda name: name not in ("tadcore", file.split("/")[0])):
+        failed, _ = run(programs[name], tree, number, limits[name])
+        if failed:
+            break
+    reason = EQUIVALENT.get((file, formula))
+    if failed:
+        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+        said = f"{name}: {failed[0]}{more}" + ("  (but said to be equivalent)" if reason else "")
+    else:
+        said = f"survived: {reason}" if reason else "SURVIVED"
+    print(f"{file:26} {formula:42} {said}", flush=True)
+    return bool(failed), bool(failed) != bool(reason)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--only", nargs="+", default=[""], help="mutants whose file or formula contains one of these")
     only = parser.parse_args().only
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     tree = target / "mutants-tree"
-    mutants = numbered()
-    copy(tree, mutants)
-    programs = build(tree, target)
-    tests = [name for name in TESTS if name in programs]
-    limits = {}
-    for name in tests:
-        failed, seconds = run(programs[name], tree, 0, None)
-        if failed:
-            sys.exit(f"without a mutant, {name}: {', '.join(failed)}")
-        limits[name] = max(LEAST, PATIENCE * seconds)
+    rooms = {}
+    for mutant in numbered():
+        if any(word in f"{mutant[1]} {mutant[2]}" for word in only):
+            rooms.setdefault(mutant[1].split("/")[0], []).append(mutant)
     print(f"{'file':26} {'formula':42} caught by", flush=True)
-    caught, survivors, chosen = 0, [], [m for m in mutants if any(word in f"{m[1]} {m[2]}" for word in only)]
-    for number, file, formula, *_ in chosen:
-        for name in sorted(tests, key=lambda name: name not in ("tadcore", file.split("/")[0])):
-            failed, _ = run(programs[name], tree, number, limits[name])
+    caught, unexplained = 0, 0
+    # A room at a time: where every loop holds a choice the tests are slow, and so is the compiler.
+    for chosen in rooms.values():
+        copy(tree, chosen)
+        programs = build(tree, target)
+        tests = [name for name in TESTS if name in programs]
+        limits = {}
+        for name in tests:
+            failed, seconds = run(programs[name], tree, 0, None)
             if failed:
-                break
-        reason = EQUIVALENT.get((file, formula))
-        if failed:
-            caught += 1
-            more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-            verdict = f"{name}: {failed[0]}{more}"
-        else:
-            verdict = f"survived: {reason}" if reason else "SURVIVED"
-        if failed and reason:
-            verdict += "  (but said to be equivalent)"
-        if bool(failed) == bool(reason):
-            survivors.append(formula)
-        print(f"{file:26} {formula:42} {verdict}", flush=True)
-    print(f"{len(chosen)} mutants: {caught} caught, {len(chosen) - caught} survived, {len(survivors)} unexplained")
-    return bool(survivors)
+                sys.exit(f"without a mutant, {name}: {', '.join(failed)}")
+            limits[name] = max(LEAST, PATIENCE * seconds)
+        for mutant in chosen:
+            failed, expected = verdict(mutant, tests, programs, tree, limits)
+            caught, unexplained = caught + failed, unexplained + (not expected)
+    total = sum(map(len, rooms.values()))
+    print(f"{total} mutants: {caught} caught, {total - caught} survived, {unexplained} unexplained")
+    return bool(unexplained)
 
 
 if __name__ == "__main__":
