@@ -110,6 +110,7 @@ mod x86 {
     use std::arch::x86_64::*;
 
     use super::Vector;
+    use crate::lanes::transpose;
 
     /// The four-number operations, the same for both widths.
     macro_rules! fours {
@@ -130,18 +131,8 @@ mod x86 {
                 unsafe { _mm256_add_pd(sum, _mm256_mul_pd(column, _mm256_set1_pd(by))) }
             }
             #[inline(always)]
-            fn transpose4([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
-                // SAFETY: the caller is compiled for this width; registers alone.
-                unsafe {
-                    let (ab0, ab1) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
-                    let (cd0, cd1) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
-                    [
-                        _mm256_permute2f128_pd::<0x20>(ab0, cd0),
-                        _mm256_permute2f128_pd::<0x20>(ab1, cd1),
-                        _mm256_permute2f128_pd::<0x31>(ab0, cd0),
-                        _mm256_permute2f128_pd::<0x31>(ab1, cd1),
-                    ]
-                }
+            fn transpose4(rows: [__m256d; 4]) -> [__m256d; 4] {
+                transpose(rows)
             }
             #[inline(always)]
             fn store4(x: __m256d, to: &mut [f64; 4]) {

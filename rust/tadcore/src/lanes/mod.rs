@@ -11,7 +11,7 @@ mod x86;
 use std::ops::{Add, Div, Mul, Sub};
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Eight, Four, Wide};
+pub(crate) use x86::{Eight, Four, Wide, transpose};
 
 /// One number, or several side by side.
 pub(crate) trait Number:
@@ -45,7 +45,11 @@ pub(crate) trait Number:
     /// A mask as bits.
     fn bits(mask: Self::Mask) -> u8;
     /// The numbers as they are, where there is one lane.
-    fn alone(_numbers: &mut [Self]) -> Option<&mut [f64]> {
+    fn alone(_numbers: &[Self]) -> Option<&[f64]> {
+        None
+    }
+    /// The same, to be written.
+    fn alone_mut(_numbers: &mut [Self]) -> Option<&mut [f64]> {
         None
     }
 
@@ -160,7 +164,11 @@ impl Number for f64 {
         u8::from(mask)
     }
     #[inline(always)]
-    fn alone(numbers: &mut [f64]) -> Option<&mut [f64]> {
+    fn alone(numbers: &[f64]) -> Option<&[f64]> {
+        Some(numbers)
+    }
+    #[inline(always)]
+    fn alone_mut(numbers: &mut [f64]) -> Option<&mut [f64]> {
         Some(numbers)
     }
 }

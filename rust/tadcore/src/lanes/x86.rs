@@ -8,21 +8,18 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use super::Number;
 
-/// AVX2: four numbers in each of `R` registers.
+/// AVX2: four numbers in a register.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Wide<const R: usize>([__m256d; R]);
+pub(crate) struct Wide(__m256d);
 
 macro_rules! operators {
     ($($trait:ident $name:ident $of:ident),*) => {$(
-        impl<const R: usize> $trait for Wide<R> {
+        impl $trait for Wide {
             type Output = Self;
             #[inline(always)]
-            fn $name(mut self, other: Self) -> Self {
-                for r in 0..R {
-                    // SAFETY: the caller is compiled for AVX2; registers alone.
-                    self.0[r] = unsafe { $of(self.0[r], other.0[r]) };
-                }
-                self
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { Self($of(self.0, other.0)) }
             }
         }
     )*};
@@ -30,102 +27,73 @@ macro_rules! operators {
 
 operators!(Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
 
-impl<const R: usize> Number for Wide<R> {
-    const LANES: usize = 4 * R;
-    type Mask = [__m256d; R];
+impl Number for Wide {
+    const LANES: usize = 4;
+    type Mask = __m256d;
 
     #[inline(always)]
     fn splat(x: f64) -> Self {
         // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { Self([_mm256_set1_pd(x); R]) }
+        unsafe { Self(_mm256_set1_pd(x)) }
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f64 {
         let mut out = [0.0; 4];
         // SAFETY: the caller is compiled for AVX2; writes the 4 numbers of `out`.
-        unsafe { _mm256_storeu_pd(out.as_mut_ptr(), self.0[lane / 4]) };
-        out[lane % 4]
+        unsafe { _mm256_storeu_pd(out.as_mut_ptr(), self.0) };
+        out[lane]
     }
     #[inline(always)]
     fn set_lane(&mut self, lane: usize, x: f64) {
         *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
     }
     #[inline(always)]
-    fn plus(mut self, x: Self, y: Self) -> Self {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
-            self.0[r] = unsafe { _mm256_fmadd_pd(x.0[r], y.0[r], self.0[r]) };
-        }
-        self
+    fn plus(self, x: Self, y: Self) -> Self {
+        // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+        unsafe { Self(_mm256_fmadd_pd(x.0, y.0, self.0)) }
     }
     #[inline(always)]
-    fn minus(mut self, x: Self, y: Self) -> Self {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
-            self.0[r] = unsafe { _mm256_fnmadd_pd(x.0[r], y.0[r], self.0[r]) };
-        }
-        self
+    fn minus(self, x: Self, y: Self) -> Self {
+        // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+        unsafe { Self(_mm256_fnmadd_pd(x.0, y.0, self.0)) }
     }
     #[inline(always)]
-    fn sqrt(mut self) -> Self {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            self.0[r] = unsafe { _mm256_sqrt_pd(self.0[r]) };
-        }
-        self
+    fn sqrt(self) -> Self {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { Self(_mm256_sqrt_pd(self.0)) }
     }
     #[inline(always)]
-    fn abs(mut self) -> Self {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            self.0[r] = unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0[r]) };
-        }
-        self
+    fn abs(self) -> Self {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)) }
     }
     #[inline(always)]
-    fn less(mut self, other: Self) -> [__m256d; R] {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            self.0[r] = unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[r], other.0[r]) };
-        }
-        self.0
+    fn less(self, other: Self) -> __m256d {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0) }
     }
     #[inline(always)]
-    fn at_most(mut self, other: Self) -> [__m256d; R] {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            self.0[r] = unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(self.0[r], other.0[r]) };
-        }
-        self.0
+    fn at_most(self, other: Self) -> __m256d {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0) }
     }
     #[inline(always)]
-    fn select(mask: [__m256d; R], mut yes: Self, no: Self) -> Self {
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            yes.0[r] = unsafe { _mm256_blendv_pd(no.0[r], yes.0[r], mask[r]) };
-        }
-        yes
+    fn select(mask: __m256d, yes: Self, no: Self) -> Self {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { Self(_mm256_blendv_pd(no.0, yes.0, mask)) }
     }
     #[inline(always)]
-    fn mask(bits: u8) -> [__m256d; R] {
+    fn mask(bits: u8) -> __m256d {
         // SAFETY: the caller is compiled for AVX2; registers alone.
         unsafe {
-            let mut mask = [_mm256_setzero_pd(); R];
-            for r in 0..R {
-                let (own, bits) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_set1_epi64x(i64::from(bits >> (4 * r))));
-                mask[r] = _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, own), own));
-            }
-            mask
+            let (own, bits) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_set1_epi64x(i64::from(bits)));
+            _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, own), own))
         }
     }
     #[inline(always)]
-    fn bits(mask: [__m256d; R]) -> u8 {
-        let mut bits = 0;
-        for r in 0..R {
-            // SAFETY: the caller is compiled for AVX2; registers alone.
-            bits |= unsafe { _mm256_movemask_pd(mask[r]) } << (4 * r);
-        }
-        bits as u8
+    fn bits(mask: __m256d) -> u8 {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { _mm256_movemask_pd(mask) as u8 }
     }
 }
 
@@ -232,4 +200,20 @@ masked!(
 unsafe fn absolute(x: __m256d) -> __m256d {
     // SAFETY: the caller is compiled for AVX-512VL; registers alone.
     unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), x) }
+}
+
+/// Rows as columns.
+#[inline(always)]
+pub(crate) fn transpose([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+    // SAFETY: the caller is compiled for AVX2; registers alone.
+    unsafe {
+        let (ab0, ab1) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+        let (cd0, cd1) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+        [
+            _mm256_permute2f128_pd::<0x20>(ab0, cd0),
+            _mm256_permute2f128_pd::<0x20>(ab1, cd1),
+            _mm256_permute2f128_pd::<0x31>(ab0, cd0),
+            _mm256_permute2f128_pd::<0x31>(ab1, cd1),
+        ]
+    }
 }

@@ -5,10 +5,11 @@
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
 //! starts canonically, ends at a stationary point near its start, and does not look further.
 
+use super::layout::Layout;
 use super::newton::Objective;
 use super::objective::RealGains;
 use super::problem::Problem;
-use super::start::{Layout, Variable};
+use super::start::Variable;
 use super::tasks::{Limits, Reached};
 use crate::lanes::norm;
 
@@ -21,7 +22,9 @@ const HALVINGS: usize = 60;
 pub(super) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
     let mut objective = RealGains::<f64, 0>::new(problem);
     let mut layout = Layout::default();
-    layout.list([variables, &[], &[], &[], &[], &[], &[], &[]], g.len(), 1);
+    layout.begin(g.len(), 1);
+    layout.place(0, variables);
+    layout.list();
     let d = layout.len();
     let mut full = vec![0.0; objective.width()];
     let (mut gradient, mut next) = (vec![0.0; d], vec![0.0; d]);

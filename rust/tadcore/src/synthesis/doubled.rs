@@ -13,12 +13,13 @@
 //! - X_r = AᵀRA + BᵀRB − M, X_i = s(AᵀRB − BᵀRA); E_r = WΔ + (WΔ)ᵀ, E_i = WB + σ(WB)ᵀ
 //! - Θ = γ₁(‖X_r‖² + ‖X_i‖²) + Σ_p(‖E_r‖² + ‖E_i‖²) + Σ_i c_i(‖Δ_i‖² + ‖B_i‖²)
 //! - ∇_A = 4γ₁R(A X_r − B X_i) + 4WᵀE_r + 2cΔ;  ∇_B = 4γ₁R(A X_i + B X_r) + 4WᵀE_i + 2cB
-//! - the Hessian's blocks are written out in [`Doubled::hessian`].
+//! - the Hessian's blocks are written out at [`Doubled`]'s [`Form`].
 //!
 //! The vector is laid out A first, then B, m × N each.
 
+use super::layout::{Form, Slot};
 use super::newton::Objective;
-use super::objective::{add_product, add_weighted, symmetric_product};
+use super::objective::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
 use super::problem::Problem;
 use crate::lanes::{Number, dot, norm, sum_of_squares, take};
 
@@ -36,6 +37,8 @@ pub(super) struct Doubled<'a, T, const N: usize> {
     delta: Vec<T>,
     /// E_r of every group, then E_i of every group.
     coupled: Vec<T>,
+    /// What stands before **I** in the Hessian's blocks AA, BB and BA at its point, m × m times three.
+    gram: Vec<T>,
     /// The gradient's scale, one for each lane.
     scale: T,
 }
@@ -53,6 +56,7 @@ impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
             kept: vec![zero; 2 * n * n],
             delta: vec![zero; m * n],
             coupled: vec![zero; 2 * groups * n * n],
+            gram: vec![zero; 3 * m * m],
             scale: T::splat(1.0),
         }
     }
@@ -60,6 +64,66 @@ impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
     #[inline(always)]
     fn dimensions(&self) -> (usize, usize) {
         (if N > 0 { N } else { self.problem.size }, self.problem.rows)
+    }
+}
+
+/// With f = 4γ₁r_ir_j and the constant parts Q± = 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** the Hessian has the
+/// blocks
+/// - AA: 4δ_ij γ₁r_i X_r + f[(AAᵀ + sBBᵀ)_ij **I** + a_jᵀa_i − s b_jᵀb_i] + Q₊
+/// - BB: 4δ_ij γ₁r_i X_r + f[(BBᵀ + sAAᵀ)_ij **I** + b_jᵀb_i − s a_jᵀa_i] + Q_σ
+/// - BA: −4δ_ij γ₁r_i X_i + f[(BAᵀ − sABᵀ)_ij **I** + a_jᵀb_i + s b_jᵀa_i]
+impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
+    #[inline(always)]
+    fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]) {
+        let p = self.problem;
+        let (n, m) = self.dimensions();
+        let half = m * n;
+        let (ra, ib) = g[..2 * half].split_at(half);
+        let (real, imaginary) = self.kept[..2 * n * n].split_at(n * n);
+        let (s, stacked) = (self.complex, T::splat(0.0).less(self.sign));
+        let lower = v.entry >= half;
+        let (entry, own) = if lower { (v.entry - half, v.own - half) } else { (v.entry, v.own) };
+        let (i, a) = (entry / n, entry % n);
+        let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
+        let factor = T::splat(4.0 * p.gamma[0] * p.r[i]);
+        if lower {
+            for j in 0..m {
+                let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
+                let (fa, sb) = (f * along(&ra[j * n..][..n], a, i, v), s * (f * along(&ib[j * n..][..n], a, i, v)));
+                let h = &mut out[j * n..][..n];
+                for b in 0..n {
+                    h[b] = (fa * bi[b]).plus(sb, ai[b]);
+                }
+                if j == i {
+                    add_row(h, T::splat(0.0) - factor, imaginary, n, a, i, v);
+                }
+                add_unit(h, a, i, v, self.gram[3 * (i * m + j) + 2]);
+            }
+        }
+        let out = if lower { &mut out[half..] } else { out };
+        for j in 0..i + 1 {
+            let h = &mut out[j * n..][..n];
+            let at = |q: usize| q * half + j * n..q * half + (j + 1) * n;
+            let [plus, minus] = &p.quadratic;
+            constant(h, &plus[at(entry)], &plus[at(own)], v);
+            if lower {
+                let (q, own) = (&minus[at(entry)], &minus[at(own)]);
+                for b in 0..n {
+                    let minus = T::splat(q[b]).minus(v.relative, T::splat(own[b]));
+                    h[b] = T::select(stacked, h[b], minus);
+                }
+            }
+            if j == i {
+                add_row(h, factor, real, n, a, i, v);
+            }
+            let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
+            let (fa, fb) = (f * along(&ra[j * n..][..n], a, i, v), f * along(&ib[j * n..][..n], a, i, v));
+            let (first, second, x, y) = if lower { (fb, s * fa, bi, ai) } else { (fa, s * fb, ai, bi) };
+            for b in 0..n {
+                h[b] = h[b].plus(first, x[b]).minus(second, y[b]);
+            }
+            add_unit(h, a, i, v, self.gram[3 * (i * m + j) + usize::from(lower)]);
+        }
     }
 }
 
@@ -157,69 +221,21 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         take(lanes, &self.x, &mut self.kept);
     }
 
-    /// With f = 4γ₁r_ir_j and the constant parts Q± = 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I**:
-    /// - AA: 4δ_ij γ₁r_i X_r + f[(AAᵀ + sBBᵀ)_ij **I** + a_jᵀa_i − s b_jᵀb_i] + Q₊
-    /// - BB: 4δ_ij γ₁r_i X_r + f[(BBᵀ + sAAᵀ)_ij **I** + b_jᵀb_i − s a_jᵀa_i] + Q_σ
-    /// - BA: −4δ_ij γ₁r_i X_i + f[(BAᵀ − sABᵀ)_ij **I** + a_jᵀb_i + s b_jᵀa_i]
     #[inline(always)]
-    fn hessian(&mut self, g: &[T], out: &mut [T]) {
+    fn prepare(&mut self, g: &[T]) {
         let p = self.problem;
         let (n, m) = self.dimensions();
-        let (half, width) = (m * n, 2 * m * n);
-        let (ra, ib) = g[..width].split_at(half);
-        let (real, imaginary) = self.kept[..2 * n * n].split_at(n * n);
-        let (upper, lower) = out[..width * width].split_at_mut(half * width);
-        let (s, stacked) = (self.complex, T::splat(0.0).less(self.sign));
+        let (ra, ib) = g[..2 * m * n].split_at(m * n);
+        let s = self.complex;
         for i in 0..m {
             let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
             for j in 0..m {
                 let (aj, bj) = (&ra[j * n..][..n], &ib[j * n..][..n]);
                 let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
-                if j <= i {
-                    let (aa, bb) = (dot(ai, aj), dot(bi, bj));
-                    let (of_a, of_b) = (f * (aa + s * bb), f * (bb + s * aa));
-                    for a in 0..n {
-                        let (row, column) = ((i * n + a) * width, j * n);
-                        let q = (i * n + a) * half + column;
-                        let (plus, minus) = (&p.quadratic[0][q..][..n], &p.quadratic[1][q..][..n]);
-                        let (fa, fb) = (f * aj[a], f * bj[a]);
-                        let (sa, sb) = (s * fa, s * fb);
-                        let h = &mut upper[row + column..][..n];
-                        for b in 0..n {
-                            h[b] = T::splat(plus[b]).plus(fa, ai[b]).minus(sb, bi[b]);
-                        }
-                        h[a] = h[a] + of_a;
-                        let h = &mut lower[row + half + column..][..n];
-                        for b in 0..n {
-                            let q = T::select(stacked, T::splat(plus[b]), T::splat(minus[b]));
-                            h[b] = q.plus(fb, bi[b]).minus(sa, ai[b]);
-                        }
-                        h[a] = h[a] + of_b;
-                    }
-                }
-                let cross = f * (dot(bi, aj) - s * dot(ai, bj));
-                for a in 0..n {
-                    let (fa, sb) = (f * aj[a], s * (f * bj[a]));
-                    let h = &mut lower[(i * n + a) * width + j * n..][..n];
-                    for b in 0..n {
-                        h[b] = (fa * bi[b]).plus(sb, ai[b]);
-                    }
-                    h[a] = h[a] + cross;
-                }
-            }
-            let own = T::splat(4.0 * p.gamma[0] * p.r[i]);
-            for a in 0..n {
-                let at = (i * n + a) * width + i * n;
-                let (xr, xi) = (&real[a * n..][..n], &imaginary[a * n..][..n]);
-                for (h, &x) in upper[at..][..n].iter_mut().zip(xr) {
-                    *h = h.plus(own, x);
-                }
-                for (h, &x) in lower[at + half..][..n].iter_mut().zip(xr) {
-                    *h = h.plus(own, x);
-                }
-                for (h, &x) in lower[at..][..n].iter_mut().zip(xi) {
-                    *h = h.minus(own, x);
-                }
+                let (aa, bb) = (dot(ai, aj), dot(bi, bj));
+                let gram = &mut self.gram[3 * (i * m + j)..][..3];
+                (gram[0], gram[1]) = (f * (aa + s * bb), f * (bb + s * aa));
+                gram[2] = f * (dot(bi, aj) - s * dot(ai, bj));
             }
         }
     }

@@ -3,12 +3,11 @@
 //! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
 //! leave the first cache side by side, and go one at a time.
 
-use super::dense;
+use super::dense::{self, Means};
 use super::doubled::Doubled;
 use super::newton::{Objective, minimise};
-use super::objective::RealGains;
+use super::objective::{Certificate, RealGains};
 use super::problem::Problem;
-use super::start::Variable;
 use super::tasks::{Limits, Owner, Tasks};
 use super::workspace::Workspace;
 use crate::lanes::Number;
@@ -42,7 +41,7 @@ pub(super) struct Engine {
     width: Width,
     one: Workspace<f64>,
     #[cfg(target_arch = "x86_64")]
-    wide: Workspace<Wide<1>>,
+    wide: Workspace<Wide>,
     #[cfg(target_arch = "x86_64")]
     four: Workspace<Four>,
     #[cfg(target_arch = "x86_64")]
@@ -79,6 +78,7 @@ impl Engine {
         owners: &[Owner],
         limits: Limits,
     ) {
+        let means = Means { library: problem.size > CONSTANT_UP_TO, width: self.width };
         #[cfg(target_arch = "x86_64")]
         if const { 0 < N && N <= SIDE_BY_SIDE_UP_TO } && tasks.len() >= SIDE_BY_SIDE_FROM {
             match self.width {
@@ -86,16 +86,16 @@ impl Engine {
                 Width::Avx2 => {
                     debug_assert!(std::arch::is_x86_feature_detected!("fma"));
                     // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
-                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, &mut self.wide) };
+                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, means, &mut self.wide) };
                 }
                 Width::Avx512 => {
                     debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
                     // SAFETY: this variant exists only where the processor said that it has AVX-512F, VL and FMA.
                     return unsafe {
                         if kind == Kind::Doubled {
-                            run_avx512_doubled::<N>(problem, tasks, owners, limits, &mut self.four)
+                            run_avx512_doubled::<N>(problem, tasks, owners, limits, means, &mut self.four)
                         } else {
-                            run_avx512_real::<N>(kind, problem, tasks, owners, limits, &mut self.eight)
+                            run_avx512_real::<N>(kind, problem, tasks, owners, limits, means, &mut self.eight)
                         }
                     };
                 }
@@ -104,11 +104,11 @@ impl Engine {
         // Every width gives the same bits; where the processor has only the target's, one version for all sizes will do.
         #[cfg(target_arch = "x86_64")]
         if self.width == Width::Baseline {
-            return run::<f64, 0>(kind, problem, tasks, owners, limits, &mut self.one);
+            return run::<f64, 0>(kind, problem, tasks, owners, limits, means, &mut self.one);
         }
         debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
         // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
-        unsafe { run_one::<N>(kind, problem, tasks, owners, limits, &mut self.one) }
+        unsafe { run_one::<N>(kind, problem, tasks, owners, limits, means, &mut self.one) }
     }
 }
 
@@ -123,9 +123,10 @@ unsafe fn run_one<const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
+    means: Means,
     w: &mut Workspace<f64>,
 ) {
-    run::<f64, N>(kind, problem, tasks, owners, limits, w);
+    run::<f64, N>(kind, problem, tasks, owners, limits, means, w);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -136,9 +137,10 @@ fn run_avx2<const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
-    w: &mut Workspace<Wide<1>>,
+    means: Means,
+    w: &mut Workspace<Wide>,
 ) {
-    run::<Wide<1>, N>(kind, problem, tasks, owners, limits, w);
+    run::<Wide, N>(kind, problem, tasks, owners, limits, means, w);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -149,11 +151,12 @@ fn run_avx512_real<const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
+    means: Means,
     w: &mut Workspace<Eight>,
 ) {
     // So that the compiler makes no version of eight doubled gains.
     let kind = if kind == Kind::Certified { Kind::Certified } else { Kind::Real };
-    run::<Eight, N>(kind, problem, tasks, owners, limits, w);
+    run::<Eight, N>(kind, problem, tasks, owners, limits, means, w);
 }
 
 /// Four at a time: the Hessian of eight would not stay in the first cache.
@@ -164,9 +167,10 @@ fn run_avx512_doubled<const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
+    means: Means,
     w: &mut Workspace<Four>,
 ) {
-    run::<Four, N>(Kind::Doubled, problem, tasks, owners, limits, w);
+    run::<Four, N>(Kind::Doubled, problem, tasks, owners, limits, means, w);
 }
 
 #[inline(always)]
@@ -176,16 +180,17 @@ fn run<T: Number, const N: usize>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
+    means: Means,
     w: &mut Workspace<T>,
 ) {
     if kind == Kind::Doubled {
-        minimise(&mut Doubled::<T, N>::new(problem), tasks, owners, limits, problem.size > CONSTANT_UP_TO, w);
+        minimise(&mut Doubled::<T, N>::new(problem), tasks, owners, limits, means, w);
         return;
     }
     let mut real = RealGains::<T, N>::new(problem);
-    minimise(&mut real, tasks, owners, limits, problem.size > CONSTANT_UP_TO, w);
+    minimise(&mut real, tasks, owners, limits, means, w);
     if kind == Kind::Certified {
-        certify(&mut real, tasks, owners, problem.size > CONSTANT_UP_TO, w);
+        certify(&mut real, tasks, owners, means, w);
     }
 }
 
@@ -195,28 +200,27 @@ fn certify<T: Number, const N: usize>(
     real: &mut RealGains<T, N>,
     tasks: &mut Tasks,
     owners: &[Owner],
-    library: bool,
+    means: Means,
     w: &mut Workspace<T>,
 ) {
     let width = real.width();
     let mut first = 0;
     while first < tasks.len() {
         let last = tasks.len().min(first + T::LANES);
-        let mut lanes: [&[Variable]; 8] = [&[]; 8];
+        w.layout.begin(tasks.width(), 1);
         for task in first..last {
             let lane = task - first;
-            lanes[lane] = owners[tasks.owner(task)].variables;
+            w.layout.place(lane, owners[tasks.owner(task)].variables);
             for (g, &x) in w.g.iter_mut().zip(tasks.point(task)) {
                 g.set_lane(lane, x);
             }
         }
-        w.layout.list(lanes, width, 1);
+        w.layout.list();
         real.value(&w.g[..width]);
-        real.certificate_form(&mut w.form);
-        w.layout.restrict_form(&mut w.form, width, &mut w.hessian);
+        w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian);
         let largest = w.layout.largest(&w.hessian);
         let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
-        let (definite, _) = dense::factorise(&w.hessian, allowance, &w.layout, library, &[], &mut [], &mut w.factor);
+        let (definite, _) = dense::factorise(&w.hessian, allowance, &w.layout, means, &mut w.factor);
         let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
         for task in first..last {
             if proved >> (task - first) & 1 == 1 {

@@ -23,6 +23,7 @@ mod dense;
 mod descent;
 mod doubled;
 mod engine;
+mod layout;
 pub mod looks;
 mod newton;
 mod objective;

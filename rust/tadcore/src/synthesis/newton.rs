@@ -10,14 +10,14 @@
 //! depend on its neighbours, nor on whether it had any: sums over the unknowns, among which a lane finds zeros for those
 //! of its neighbours, go in order.
 
-use super::dense;
-use super::start::Variable;
+use super::dense::{self, Means};
+use super::layout::{Form, packed};
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
 use crate::lanes::{Number, dot_in_order, take};
 
-/// A function of gains laid out as one vector of `width` entries.
-pub(super) trait Objective<T: Number> {
+/// A function of gains laid out as one vector of `width` entries, and the form that its Hessian is.
+pub(super) trait Objective<T: Number>: Form<T> {
     fn width(&self) -> usize;
     /// Tells a lane which kind of doubled gains it is to hold, and the scale of their gradient.
     fn set_lane(&mut self, _lane: usize, _complex: bool, _scale: f64) {}
@@ -27,8 +27,8 @@ pub(super) trait Objective<T: Number> {
     fn gradient(&mut self, g: &[T], out: &mut [T]);
     /// Keeps the point last evaluated, in these lanes, for the Hessian.
     fn keep(&mut self, lanes: T::Mask);
-    /// The Hessian at the point kept, row-major; at least the blocks on and below the diagonal.
-    fn hessian(&mut self, g: &[T], out: &mut [T]);
+    /// Prepares for the rows of the Hessian at `g`, the point kept.
+    fn prepare(&mut self, g: &[T]);
     /// Size of the parts that cancel in the gradient at the point last evaluated: what its norm is relative to.
     fn gradient_scale(&self, g: &[T]) -> T;
     /// Size of the parts of the value: what its rounding is relative to.
@@ -72,12 +72,12 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
-    library: bool,
+    means: Means,
     w: &mut Workspace<T>,
 ) {
     let width = objective.width();
     w.grow(width);
-    let Workspace { layout, g, slope: full, trial, trial_slope, rival, form, hessian, factor, gradient, step, other } =
+    let Workspace { layout, g, slope: full, trial, trial_slope, rival, row, hessian, factor, gradient, step, other } =
         w;
     let (g, full, trial, trial_slope, rival) =
         (&mut g[..width], &mut full[..width], &mut trial[..width], &mut trial_slope[..width], &mut rival[..width]);
@@ -93,7 +93,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         rival: zero,
         near: zero,
     };
-    let mut lanes: [&[Variable]; 8] = [&[]; 8];
+    layout.begin(tasks.width(), width / tasks.width().max(1));
     let mut task = [0; 8];
     let (mut next, mut largest, mut stale) = (0, zero, true);
     // Lanes that work; that have a new point, not yet evaluated; whose last step kept its promise; that have a rival.
@@ -122,44 +122,46 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             s.damping.set_lane(lane, 0.0);
             s.iterations.set_lane(lane, 0.0);
             (busy, fresh, trusted) = (busy | bit, fresh | bit, trusted & !bit);
-            (lanes[lane], task[lane]) = (owner.variables, next);
+            layout.place(lane, owner.variables);
+            task[lane] = next;
             (next, changed) = (next + 1, true);
         }
         if busy == 0 {
             return;
         }
         if changed {
-            layout.list(lanes, tasks.width(), width / tasks.width());
+            layout.list();
             stale = true;
         }
         let d = layout.len();
         let (gradient, step, w_step) = (&mut gradient[..d], &mut step[..d], &mut other[..d]);
-        let (hessian, factor) = (&mut hessian[..d * d], &mut factor[..d * d]);
+        let (hessian, factor) = (&mut hessian[..packed(d)], &mut factor[..d * d]);
         let old = busy & !fresh;
         let (mut moved, mut failed, mut ended) = (0, 0, 0);
         let (mut noise, mut predicted, mut raise) = (zero, zero, zero);
         if old != 0 {
             if stale {
-                objective.hessian(g, form);
-                layout.restrict_form(form, width, hessian);
+                objective.prepare(g);
+                layout.restrict_form(objective, g, row, hessian);
                 layout.restrict(full, gradient);
                 largest = layout.largest(hessian);
                 stale = false;
             }
             noise = T::splat(1e-15) * (s.value + (s.value * noise_scale).sqrt());
-            for (w, &g) in w_step.iter_mut().zip(gradient.iter()) {
-                *w = zero - g;
-            }
             raise = (T::splat(4.0) * s.damping)
                 .or_larger(T::splat(FIRST_DAMPING) * largest)
                 .or_larger(T::splat(f64::MIN_POSITIVE));
-            let (definite, lack) = dense::factorise(hessian, s.damping, layout, library, w_step, step, factor);
+            let (definite, lack) = dense::factorise(hessian, s.damping, layout, means, factor);
             let definite = T::bits(definite) & old;
             failed = old & !definite;
             // An indefinite matrix lacks about what its pivot did.
             let lack = s.damping + T::select(lack.less(largest), lack, largest);
             raise = T::select(T::mask(definite), raise, raise.or_larger(lack));
             if definite != 0 {
+                for (step, &g) in step.iter_mut().zip(gradient.iter()) {
+                    *step = zero - g;
+                }
+                dense::forward(factor, d, step);
                 dense::back(factor, d, step);
                 let length2 = dot_in_order(step, step);
                 let short = T::bits(length2.at_most(T::splat(limits.longest * limits.longest)));
@@ -167,10 +169,10 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 if long != 0 {
                     // Moré and Sorensen's step towards the μ at which the length is right: Newton on its reciprocal.
                     w_step.copy_from_slice(step);
-                    dense::forward(factor, d, library, w_step);
+                    let slope = dense::forward(factor, d, w_step);
                     let length = length2.sqrt();
                     let excess = length * T::splat(1.0 / (AIM * limits.longest)) - T::splat(1.0);
-                    let better = s.damping + length2 / dot_in_order(w_step, w_step) * excess;
+                    let better = s.damping + length2 / slope * excess;
                     let least = (T::splat(LEAST_RAISE) * s.damping)
                         .or_larger(T::splat(FIRST_DAMPING * FIRST_DAMPING) * largest)
                         .or_larger(T::splat(f64::MIN_POSITIVE));
@@ -258,7 +260,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             for (x, g) in tasks.point_mut(task[lane]).iter_mut().zip(g.iter()) {
                 *x = g.lane(lane);
             }
-            lanes[lane] = &[];
+            layout.place(lane, &[]);
             let (iterations, scale) = (s.iterations.lane(lane) as usize, s.scale.lane(lane));
             let reached = Reached::new(s.value.lane(lane), s.slope.lane(lane), scale, iterations, &limits);
             tasks.end(task[lane], reached);

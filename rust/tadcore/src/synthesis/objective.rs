@@ -12,6 +12,7 @@
 //! form is positive semidefinite on the variables, G* is a *global* minimiser. It is the Hessian without its
 //! Gauss–Newton part: one more factorisation proves what no number of restarts can.
 
+use super::layout::{Form, Slot};
 use super::newton::Objective;
 use super::problem::Problem;
 use crate::lanes::{Number, dot, norm, sum_of_squares, take};
@@ -27,6 +28,8 @@ pub(super) struct RealGains<'a, T, const N: usize> {
     delta: Vec<T>,
     /// E_p, N × N each.
     coupled: Vec<T>,
+    /// 4γ₁ r_i r_j g_i·g_j at the point of the Hessian, m × m.
+    gram: Vec<T>,
 }
 
 impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
@@ -40,6 +43,7 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
             kept: vec![zero; n * n],
             delta: vec![zero; m * n],
             coupled: vec![zero; problem.coupling.len() * n * n],
+            gram: vec![zero; m * m],
         }
     }
 
@@ -48,23 +52,86 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
         (if N > 0 { N } else { self.problem.size }, self.problem.rows)
     }
 
-    /// The constant part plus 4γ₁ δ_ij r_i X: the form whose definiteness certifies the point last evaluated.
+    /// The product of a direction in row i with the Hessian, X being `x`, or with the certificate's form: the Hessian
+    /// without its Gauss–Newton part. Blocks j ≤ i.
     #[inline(always)]
-    pub(super) fn certificate_form(&self, out: &mut [T]) {
+    fn product<const GAUSS_NEWTON: bool>(&self, x: &[T], g: &[T], v: &Slot<T>, out: &mut [T]) {
+        let p = self.problem;
         let (n, m) = self.dimensions();
-        let width = m * n;
-        for (out, &q) in out[..width * width].iter_mut().zip(&self.problem.quadratic[0]) {
-            *out = T::splat(q);
-        }
-        for i in 0..m {
-            let factor = T::splat(4.0 * self.problem.gamma[0] * self.problem.r[i]);
-            for a in 0..n {
-                let row = &mut out[(i * n + a) * width + i * n..][..n];
-                for (h, &x) in row.iter_mut().zip(&self.x[a * n..(a + 1) * n]) {
-                    *h = h.plus(factor, x);
+        let (i, a) = (v.entry / n, v.entry % n);
+        let (gi, width, end) = (&g[i * n..][..n], m * n, (i + 1) * n);
+        let (q, own) = (&p.quadratic[0][v.entry * width..][..end], &p.quadratic[0][v.own * width..][..end]);
+        let curvature = T::splat(4.0 * p.gamma[0] * p.r[i]);
+        for j in 0..i + 1 {
+            let (gj, h) = (&g[j * n..][..n], &mut out[j * n..][..n]);
+            constant(h, &q[j * n..][..n], &own[j * n..][..n], v);
+            if j == i {
+                add_row(h, curvature, x, n, a, i, v);
+            }
+            if GAUSS_NEWTON {
+                let scale = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]) * along(gj, a, i, v);
+                for b in 0..n {
+                    h[b] = h[b].plus(scale, gi[b]);
                 }
+                add_unit(h, a, i, v, self.gram[i * m + j]);
             }
         }
+    }
+}
+
+/// h := q − relative·own, rows of a constant matrix.
+#[inline(always)]
+pub(super) fn constant<T: Number>(h: &mut [T], q: &[f64], own: &[f64], v: &Slot<T>) {
+    if v.differs {
+        for ((h, &q), &own) in h.iter_mut().zip(q).zip(own) {
+            *h = T::splat(q).minus(v.relative, T::splat(own));
+        }
+    } else {
+        for (h, &q) in h.iter_mut().zip(q) {
+            *h = T::splat(q);
+        }
+    }
+}
+
+/// A row's product with the direction e_a − relative·e_i.
+#[inline(always)]
+pub(super) fn along<T: Number>(row: &[T], a: usize, i: usize, v: &Slot<T>) -> T {
+    if v.differs { row[a].minus(v.relative, row[i]) } else { row[a] }
+}
+
+/// h += x · (e_a − relative·e_i).
+#[inline(always)]
+pub(super) fn add_unit<T: Number>(h: &mut [T], a: usize, i: usize, v: &Slot<T>, x: T) {
+    h[a] = h[a] + x;
+    if v.differs {
+        h[i] = h[i].minus(v.relative, x);
+    }
+}
+
+/// h += factor · (x_a − relative·x_i), rows of a matrix x.
+#[inline(always)]
+pub(super) fn add_row<T: Number>(h: &mut [T], factor: T, x: &[T], n: usize, a: usize, i: usize, v: &Slot<T>) {
+    let (xa, xi) = (&x[a * n..][..n], &x[i * n..][..n]);
+    for b in 0..n {
+        let x = if v.differs { xa[b].minus(v.relative, xi[b]) } else { xa[b] };
+        h[b] = h[b].plus(factor, x);
+    }
+}
+
+impl<T: Number, const N: usize> Form<T> for RealGains<'_, T, N> {
+    #[inline(always)]
+    fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]) {
+        self.product::<true>(&self.kept, g, v, out);
+    }
+}
+
+/// The form whose definiteness certifies the point last evaluated: its blocks are 4γ₁ δ_ij r_i X + Q_ij.
+pub(super) struct Certificate<'a, 'b, T, const N: usize>(pub &'a RealGains<'b, T, N>);
+
+impl<T: Number, const N: usize> Form<T> for Certificate<'_, '_, T, N> {
+    #[inline(always)]
+    fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]) {
+        self.0.product::<false>(&self.0.x, g, v, out);
     }
 }
 
@@ -134,33 +201,13 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
     }
 
     #[inline(always)]
-    fn hessian(&mut self, g: &[T], out: &mut [T]) {
+    fn prepare(&mut self, g: &[T]) {
         let p = self.problem;
         let (n, m) = self.dimensions();
-        let width = m * n;
-        let (x, quadratic) = (&self.kept[..n * n], &p.quadratic[0][..width * width]);
         for i in 0..m {
-            let gi = &g[i * n..(i + 1) * n];
-            for j in 0..=i {
-                let gj = &g[j * n..(j + 1) * n];
+            for j in 0..i + 1 {
                 let factor = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
-                let same = factor * dot(gi, gj);
-                for a in 0..n {
-                    let h = &mut out[(i * n + a) * width + j * n..][..n];
-                    let q = &quadratic[(i * n + a) * width + j * n..][..n];
-                    let scale = factor * gj[a];
-                    for b in 0..n {
-                        h[b] = T::splat(q[b]).plus(scale, gi[b]);
-                    }
-                    h[a] = h[a] + same;
-                }
-            }
-            let own = T::splat(4.0 * p.gamma[0] * p.r[i]);
-            for a in 0..n {
-                let h = &mut out[(i * n + a) * width + i * n..][..n];
-                for (h, &x) in h.iter_mut().zip(&x[a * n..(a + 1) * n]) {
-                    *h = h.plus(own, x);
-                }
+                self.gram[i * m + j] = factor * dot(&g[i * n..][..n], &g[j * n..][..n]);
             }
         }
     }

@@ -1,8 +1,10 @@
 //! Derivatives against differences, the value against its terms, and lanes against one number.
 
 use super::doubled::Doubled;
+use super::layout::{Layout, packed};
 use super::newton::Objective;
 use super::objective::RealGains;
+use super::start::Variable;
 use super::*;
 use crate::game::Interaction;
 use crate::width::Width;
@@ -14,7 +16,9 @@ fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
     objective.value(g);
     objective.gradient(g, &mut gradient);
     objective.keep(true);
-    objective.hessian(g, &mut hessian);
+    objective.prepare(g);
+    // Each entry alone is a variable, and none is relative.
+    restrict(objective, g, &|entry| Variable { entry, own: entry, relative: false }, 1, &mut hessian);
     for a in 0..width {
         let mut probe = |shift: f64| {
             let mut p = g.to_vec();
@@ -29,9 +33,48 @@ fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
         assert!((slope - gradient[a]).abs() < 1e-6 * (1.0 + slope.abs()), "gradient {a}");
         for b in 0..=a {
             let curve = (up[b] - down[b]) / (2.0 * h);
-            assert!((curve - hessian[a * width + b]).abs() < 1e-5 * (1.0 + curve.abs()), "hessian {a} {b}");
+            assert!((curve - hessian[packed(a) + b]).abs() < 1e-5 * (1.0 + curve.abs()), "hessian {a} {b}");
         }
     }
+    // Directions e_j − e_i, in every row but the first: the same form, by its product with them.
+    let full = |a: usize, b: usize| hessian[packed(a.max(b)) + a.min(b)];
+    let (rows, copies) = (3, if width > 12 { 2 } else { 1 });
+    let n = width / rows / copies;
+    let variable = |entry: usize| Variable { entry, own: entry / n * n + entry / n, relative: entry >= n };
+    let mut restricted = vec![0.0; width * width];
+    restrict(objective, g, &variable, copies, &mut restricted);
+    let direction = |entry: usize| {
+        let (copy, v) = (entry / (rows * n) * rows * n, variable(entry % (rows * n)));
+        (entry, v.relative.then_some(copy + v.own))
+    };
+    for a in 0..width {
+        for b in 0..=a {
+            let ((a, own_a), (b, own_b)) = (direction(a), direction(b));
+            let column = |a| full(a, b) - own_b.map_or(0.0, |own| full(a, own));
+            let expected = column(a) - own_a.map_or(0.0, column);
+            let found = restricted[packed(a) + b];
+            assert!(
+                (found - expected).abs() < 1e-12 * (1.0 + full(a, a).abs() + full(b, b).abs()),
+                "direction {a} {b}"
+            );
+        }
+    }
+}
+
+/// The Hessian on as many copies of the variables as the objective has.
+fn restrict(
+    objective: &impl Objective<f64>,
+    g: &[f64],
+    variable: &dyn Fn(usize) -> Variable,
+    copies: usize,
+    out: &mut [f64],
+) {
+    let width = objective.width() / copies;
+    let mut layout = Layout::default();
+    layout.begin(width, copies);
+    layout.place(0, &(0..width).map(variable).collect::<Vec<_>>());
+    layout.list();
+    layout.restrict_form(objective, g, &mut vec![0.0; objective.width()], out);
 }
 
 fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {

@@ -1,6 +1,6 @@
 //! Scratch that is reused from solve to solve.
 
-use super::start::Layout;
+use super::layout::{GROUP, Layout, packed};
 use crate::lanes::Number;
 
 /// The memory of descents side by side.
@@ -18,8 +18,8 @@ pub(super) struct Workspace<T: Number> {
     pub(super) trial_slope: Vec<T>,
     /// The best points known.
     pub(super) rival: Vec<T>,
-    /// A form on all gains, then restricted to the variables, then factorised.
-    pub(super) form: Vec<T>,
+    /// A row of a form on all gains, the form restricted to the variables, and its factor.
+    pub(super) row: Vec<T>,
     pub(super) hessian: Vec<T>,
     pub(super) factor: Vec<T>,
     /// The gradient with respect to the variables, the step, and a vector to spare.
@@ -38,7 +38,7 @@ impl<T: Number> Default for Workspace<T> {
             trial: empty(),
             trial_slope: empty(),
             rival: empty(),
-            form: empty(),
+            row: empty(),
             hessian: empty(),
             factor: empty(),
             gradient: empty(),
@@ -52,25 +52,21 @@ impl<T: Number> Workspace<T> {
     /// Makes room for gains of `width` entries.
     #[inline(always)]
     pub(super) fn grow(&mut self, width: usize) {
-        let vectors = [
-            &mut self.g,
-            &mut self.slope,
-            &mut self.trial,
-            &mut self.trial_slope,
-            &mut self.rival,
-            &mut self.gradient,
-            &mut self.step,
-            &mut self.other,
-        ];
-        for vector in vectors {
-            if vector.len() < width {
-                vector.resize(width, T::splat(0.0));
+        let unknowns = width.next_multiple_of(GROUP);
+        let room = |numbers: &mut Vec<T>, len| {
+            if numbers.len() < len {
+                numbers.resize(len, T::splat(0.0));
             }
+        };
+        for vector in
+            [&mut self.g, &mut self.slope, &mut self.trial, &mut self.trial_slope, &mut self.rival, &mut self.row]
+        {
+            room(vector, width);
         }
-        for matrix in [&mut self.form, &mut self.hessian, &mut self.factor] {
-            if matrix.len() < width * width {
-                matrix.resize(width * width, T::splat(0.0));
-            }
+        for vector in [&mut self.gradient, &mut self.step, &mut self.other] {
+            room(vector, unknowns);
         }
+        room(&mut self.hessian, packed(unknowns));
+        room(&mut self.factor, unknowns * unknowns);
     }
 }

@@ -1,0 +1,356 @@
+//! Factorisation of small dense symmetric matrices, H + μ**I** = **L D L**ᵀ with a unit diagonal in **L**, and the solves
+//! that go with it.
+//!
+//! Newton systems here have at most mN unknowns: 12 for three defenders, where plain loops beat any library call. Past
+//! [`LIBRARY_SIZE`] unknowns faer's blocked factorisation takes over.
+//!
+//! The loops work on tiles of 4 × 4 entries, which stay in registers while products of the columns before them come off;
+//! four divisions follow one another in a tile of the diagonal, and nothing else waits. There is no square root. A factor
+//! holds **L** below its diagonal, C = **LD** above it (entry (j, i), j < i, is C_ij), and 1/D on it: what a tile takes
+//! off its neighbours lies together in memory, by rows and by columns.
+
+use faer::linalg::cholesky::ldlt::factor;
+use faer::{MatMut, Par};
+
+#[cfg(target_arch = "x86_64")]
+mod tiles;
+
+use super::layout::{GROUP, Layout, packed};
+use crate::lanes::Number;
+use crate::width::Width;
+
+/// Unknowns from which faer's factorisation may be used.
+const LIBRARY_SIZE: usize = 96;
+
+/// A tile.
+type Tile<T> = [[T; GROUP]; GROUP];
+
+/// What may work on one matrix at a time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Means {
+    /// faer, on large matrices; its bits differ from those of the loops here.
+    pub library: bool,
+    /// Registers, with the same bits; only where the processor has AVX2 and FMA.
+    pub width: Width,
+}
+
+/// Factorises H + μI, given by its packed lower triangle, into `f`, and says in which lanes it is positive definite to
+/// working precision. Where it is not, the second answer is the pivot that failed, its sign turned: about what μ lacks.
+///
+/// An unknown that a lane does not have (`layout`) has the unit row there.
+#[inline(always)]
+pub(super) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, means: Means, f: &mut [T]) -> (T::Mask, T) {
+    let d = layout.len();
+    if let (Some(h), Some(f)) = (T::alone(h), T::alone_mut(f)) {
+        let (damping, used) = (damping.lane(0), layout.used());
+        let (definite, lack) = if means.library && d >= LIBRARY_SIZE {
+            (factorise_large(h, damping, used, d, f), 0.0)
+        } else {
+            factorise_alone(h, damping, used, d, means.width, f)
+        };
+        return (T::mask(u8::from(definite)), T::splat(lack));
+    }
+    let mut pivots = Pivots::new();
+    for first in (0..d).step_by(GROUP) {
+        let active = std::array::from_fn(|j| layout.active(first + j));
+        factorise_columns(h, damping, first, active, f, d, &mut pivots);
+    }
+    (T::mask(pivots.ok), pivots.lack)
+}
+
+/// The same for one matrix, whose empty unknowns are those from `used` on.
+fn factorise_alone(h: &[f64], damping: f64, used: usize, d: usize, width: Width, f: &mut [f64]) -> (bool, f64) {
+    #[cfg(target_arch = "x86_64")]
+    if width != Width::Baseline {
+        debug_assert!(std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma"));
+        // SAFETY: the other widths exist only where the processor said that it has AVX2 and FMA.
+        return unsafe { tiles::factorise(h, damping, used, d, f) };
+    }
+    debug_assert!(width == Width::Baseline);
+    let mut pivots = Pivots::new();
+    for first in (0..d).step_by(GROUP) {
+        let active = std::array::from_fn(|j| first + j < used);
+        factorise_columns(h, damping, first, active, f, d, &mut pivots);
+        if pivots.ok & 1 == 0 {
+            break;
+        }
+    }
+    (pivots.ok & 1 == 1, pivots.lack)
+}
+
+/// The columns of one tile.
+#[inline(always)]
+fn factorise_columns<T: Number>(
+    h: &[T],
+    damping: T,
+    first: usize,
+    active: [T::Mask; GROUP],
+    f: &mut [T],
+    d: usize,
+    pivots: &mut Pivots<T>,
+) {
+    let mut on = tile(h, first, first, damping, f, d);
+    let reciprocal = diagonal(&mut on, first, h, damping, active, f, d, pivots);
+    for row in (first + GROUP..d).step_by(GROUP) {
+        let mut below = tile(h, row, first, damping, f, d);
+        let mut l = [[T::splat(0.0); GROUP]; GROUP];
+        for j in 0..GROUP {
+            for i in 0..GROUP {
+                l[i][j] = below[i][j] * reciprocal[j];
+                for k in j + 1..GROUP {
+                    below[i][k] = below[i][k].minus(l[i][j], on[k][j]);
+                }
+            }
+        }
+        for i in 0..GROUP {
+            f[(row + i) * d + first..][..GROUP].copy_from_slice(&l[i]);
+        }
+        for j in 0..GROUP {
+            let column = [below[0][j], below[1][j], below[2][j], below[3][j]];
+            f[(first + j) * d + row..][..GROUP].copy_from_slice(&column);
+        }
+    }
+}
+
+/// Factorises a tile of the diagonal, from which the columns before are taken off, and writes its part of the factor. The
+/// tile is left with C, and 1/D is the answer.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn diagonal<T: Number>(
+    on: &mut Tile<T>,
+    first: usize,
+    h: &[T],
+    damping: T,
+    active: [T::Mask; GROUP],
+    f: &mut [T],
+    d: usize,
+    pivots: &mut Pivots<T>,
+) -> [T; GROUP] {
+    let mut reciprocal = [T::splat(0.0); GROUP];
+    for j in 0..GROUP {
+        let original = h[packed(first + j) + first + j] + damping;
+        reciprocal[j] = T::splat(1.0) / pivots.check(on[j][j], original, active[j]);
+        for i in j + 1..GROUP {
+            let l = on[i][j] * reciprocal[j];
+            for k in j + 1..i + 1 {
+                on[i][k] = on[i][k].minus(l, on[k][j]);
+            }
+            f[(first + i) * d + first + j] = l;
+            f[(first + j) * d + first + i] = on[i][j];
+        }
+        f[(first + j) * d + first + j] = reciprocal[j];
+    }
+    reciprocal
+}
+
+/// The tile of H + μI at (`row`, `column`), less the products of the columns before it. On the diagonal, what lies above
+/// is not used.
+#[inline(always)]
+fn tile<T: Number>(h: &[T], row: usize, column: usize, damping: T, f: &[T], d: usize) -> Tile<T> {
+    let mut a = [[T::splat(0.0); GROUP]; GROUP];
+    for i in 0..GROUP {
+        let len = if row == column { i + 1 } else { GROUP };
+        a[i][..len].copy_from_slice(&h[packed(row + i) + column..][..len]);
+        if row == column {
+            a[i][i] = a[i][i] + damping;
+        }
+    }
+    let rows: [&[T]; GROUP] = std::array::from_fn(|i| &f[(row + i) * d..][..column]);
+    for k in 0..column {
+        let c = &f[k * d + column..][..GROUP];
+        for i in 0..GROUP {
+            let l = rows[i][k];
+            for j in 0..GROUP {
+                a[i][j] = a[i][j].minus(l, c[j]);
+            }
+        }
+    }
+    a
+}
+
+/// What the pivots said so far.
+struct Pivots<T> {
+    /// The lanes whose pivots were all sound.
+    ok: u8,
+    /// The first that was not, its sign turned.
+    lack: T,
+}
+
+impl<T: Number> Pivots<T> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { ok: u8::MAX, lack: T::splat(0.0) }
+    }
+
+    /// The pivot to divide by: one where there is no unknown or the matrix is refused, whose lane goes on with the others
+    /// and is not used. A pivot is sound unless it is lost in the rounding of the diagonal entry that it comes from.
+    #[inline(always)]
+    fn check(&mut self, pivot: T, original: T, active: T::Mask) -> T {
+        let sound =
+            T::bits((T::splat(f64::EPSILON) * original.abs()).less(pivot)) & T::bits(T::splat(0.0).less(original));
+        let active = T::bits(active);
+        let refused = active & !sound;
+        self.lack = T::select(T::mask(self.ok & refused), T::splat(0.0) - pivot, self.lack);
+        self.ok &= !refused;
+        T::select(T::mask(sound & active), pivot, T::splat(1.0))
+    }
+}
+
+#[inline(never)]
+fn factorise_large(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> bool {
+    for i in 0..d {
+        f[i * d..][..i + 1].copy_from_slice(&h[packed(i)..][..i + 1]);
+        f[i * d + i] = if i < used { f[i * d + i] + damping } else { 1.0 };
+    }
+    // faer reads columns: the transposed view turns our lower triangle, stored by rows, into its row-strided one.
+    let mut view = MatMut::from_row_major_slice_mut(&mut f[..d * d], d, d);
+    let need = factor::cholesky_in_place_scratch::<f64>(d, Par::Seq, faer::Spec::default());
+    let mut memory = faer::dyn_stack::MemBuffer::new(need);
+    let stack = faer::dyn_stack::MemStack::new(&mut memory);
+    let signs = factor::LdltRegularization::default();
+    if factor::cholesky_in_place(view.as_mut(), signs, Par::Seq, stack, faer::Spec::default()).is_err() {
+        return false;
+    }
+    for j in 0..d {
+        let pivot = f[j * d + j];
+        if !pivot.is_finite() || pivot <= 0.0 {
+            return false;
+        }
+        for i in j + 1..d {
+            f[j * d + i] = f[i * d + j] * pivot;
+        }
+        f[j * d + j] = 1.0 / pivot;
+    }
+    true
+}
+
+/// x := (**LD**)⁻¹x; the sum Σx²/D of **L**⁻¹x, that is xᵀ(H + μ**I**)⁻¹x of the x given.
+#[inline(always)]
+pub(super) fn forward<T: Number>(f: &[T], d: usize, x: &mut [T]) -> T {
+    let mut sum = T::splat(0.0);
+    for first in (0..d).step_by(GROUP) {
+        let (mut y, mut z) = ([T::splat(0.0); GROUP], [T::splat(0.0); GROUP]);
+        y.copy_from_slice(&x[first..first + GROUP]);
+        let c: [&[T]; GROUP] = std::array::from_fn(|j| &f[(first + j) * d..][..d]);
+        for j in 0..GROUP {
+            z[j] = y[j] * c[j][first + j];
+            sum = sum.plus(y[j], z[j]);
+            for i in j + 1..GROUP {
+                y[i] = y[i].minus(z[j], c[j][first + i]);
+            }
+        }
+        x[first..first + GROUP].copy_from_slice(&z);
+        for i in first + GROUP..d {
+            x[i] = x[i].minus(z[0], c[0][i]).minus(z[1], c[1][i]).minus(z[2], c[2][i]).minus(z[3], c[3][i]);
+        }
+    }
+    sum
+}
+
+/// x := **L**⁻ᵀx: after [`forward`], the solution of (H + μ**I**)x = b.
+#[inline(always)]
+pub(super) fn back<T: Number>(f: &[T], d: usize, x: &mut [T]) {
+    for first in (0..d).step_by(GROUP).rev() {
+        let l: [&[T]; GROUP] = std::array::from_fn(|i| &f[(first + i) * d..][..first + GROUP]);
+        let (above, rest) = x.split_at_mut(first);
+        let z = &mut rest[..GROUP];
+        for i in (0..GROUP).rev() {
+            for j in 0..i {
+                z[j] = z[j].minus(l[i][first + j], z[i]);
+            }
+        }
+        for j in 0..first {
+            above[j] = above[j].minus(l[3][j], z[3]).minus(l[2][j], z[2]).minus(l[1][j], z[1]).minus(l[0][j], z[0]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::start::Variable;
+    use super::*;
+
+    fn layout(d: usize) -> Layout<f64> {
+        let variables: Vec<Variable> = (0..d).map(|entry| Variable { entry, own: 0, relative: false }).collect();
+        let mut layout = Layout::default();
+        layout.begin(d, 1);
+        layout.place(0, &variables);
+        layout.list();
+        layout
+    }
+
+    /// The packed lower triangle of a matrix, filled up with empty rows.
+    fn lower(d: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let full = d.next_multiple_of(GROUP);
+        (0..full)
+            .flat_map(|i| (0..=i).map(move |j| (i, j)))
+            .map(|(i, j)| if i < d { entry(i, j) } else { 0.0 })
+            .collect()
+    }
+
+    fn means() -> Vec<Means> {
+        let alone = Width::all().into_iter().map(|width| Means { library: false, width });
+        alone.chain([Means { library: true, width: Width::Baseline }]).collect()
+    }
+
+    #[test]
+    fn every_width_gives_the_same_factor() {
+        for used in [1, 4, 7, 9, 12, 31, 58] {
+            let (h, layout) =
+                (lower(used, |i, j| ((i * 7 + j * 3) as f64).sin() + if i == j { 40.0 } else { 0.0 }), layout(used));
+            let factors = Width::all().into_iter().map(|width| {
+                let mut f = vec![0.0; layout.len() * layout.len()];
+                let answer = factorise(&h, 0.125, &layout, Means { library: false, width }, &mut f);
+                (answer, f)
+            });
+            let factors: Vec<_> = factors.collect();
+            assert!(factors.iter().all(|found| *found == factors[0]), "{used}");
+        }
+    }
+
+    #[test]
+    fn both_factorisations_solve_the_same_system() {
+        for d in [1, 2, 5, 12, 95, 96, 98, 128] {
+            let entry = |i: usize, j: usize| 1.0 / (1.0 + (i - j) as f64) + if i == j { 2.0 } else { 0.0 };
+            let damped = |i: usize, j: usize| entry(i.max(j), i.min(j)) + if i == j { 0.25 } else { 0.0 };
+            let (h, layout) = (lower(d, entry), layout(d));
+            let full = layout.len();
+            let mut b: Vec<f64> = (0..d).map(|i| (i as f64 + 1.0).sin()).collect();
+            b.resize(full, 0.0);
+            for means in means() {
+                let (mut f, mut x) = (vec![f64::NAN; full * full], b.clone());
+                assert!(factorise(&h, 0.25, &layout, means, &mut f).0);
+                let form = forward(&f, full, &mut x);
+                back(&f, full, &mut x);
+                for i in 0..d {
+                    let sum: f64 = (0..d).map(|j| damped(i, j) * x[j]).sum();
+                    assert!((sum - b[i]).abs() < 1e-13 * d as f64, "{d} {i}");
+                }
+                let product: f64 = b.iter().zip(&x).map(|(b, x)| b * x).sum();
+                assert!((form - product).abs() < 1e-13 * d as f64, "{d}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        for (d, means) in [2, 7, 96].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means))) {
+            for second in [2.0, 1.0] {
+                let h = lower(d, |i, j| {
+                    if i == j {
+                        1.0
+                    } else if (i, j) == (1, 0) {
+                        second
+                    } else {
+                        0.0
+                    }
+                });
+                let layout = layout(d);
+                let mut f = vec![0.0; layout.len() * layout.len()];
+                let (definite, lack) = factorise(&h, 0.0, &layout, means, &mut f);
+                assert!(!definite, "{d} {second}");
+                assert!(means.library && d >= LIBRARY_SIZE || lack == second * second - 1.0, "{d} {lack}");
+            }
+        }
+    }
+}
