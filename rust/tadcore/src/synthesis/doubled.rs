@@ -86,28 +86,26 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
         let (i, a) = (entry / n, entry % n);
         let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
         let factor = T::splat(4.0 * p.gamma[0] * p.r[i]);
-        if lower {
-            for j in 0..m {
-                let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
-                let (fa, sb) = (f * along(&ra[j * n..][..n], a, i, v), s * (f * along(&ib[j * n..][..n], a, i, v)));
-                let h = &mut out[j * n..][..n];
-                for b in 0..n {
-                    h[b] = (fa * bi[b]).plus(sb, ai[b]);
-                }
-                if j == i {
-                    add_row(h, T::splat(0.0) - factor, imaginary, n, a, i, v);
-                }
-                add_unit(h, a, i, v, self.gram[3 * (i * m + j) + 2]);
+        let strength = 4.0 * p.gamma[0] * p.r[i];
+        let players = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(&p.r).zip(self.gram[3 * i * m..].chunks_exact(3));
+        let (cross, out) = out.split_at_mut(if lower { half } else { 0 });
+        for (j, (h, (((aj, bj), &r), gram))) in cross.chunks_exact_mut(n).zip(players.clone()).enumerate() {
+            let f = T::splat(strength * r);
+            let (fa, sb) = (f * along(aj, a, i, v), s * (f * along(bj, a, i, v)));
+            for b in 0..n {
+                h[b] = (fa * bi[b]).plus(sb, ai[b]);
             }
+            if j == i {
+                add_row(h, T::splat(0.0) - factor, imaginary, n, a, i, v);
+            }
+            add_unit(h, a, i, v, gram[2]);
         }
-        let out = if lower { &mut out[half..] } else { out };
-        for j in 0..i + 1 {
-            let h = &mut out[j * n..][..n];
-            let at = |q: usize| q * half + j * n..q * half + (j + 1) * n;
-            let [plus, minus] = &p.quadratic;
-            constant(h, &plus[at(entry)], &plus[at(own)], v);
+        let [plus, minus] = &p.quadratic;
+        for (j, (h, (((aj, bj), &r), gram))) in out.chunks_exact_mut(n).zip(players).take(i + 1).enumerate() {
+            let (at, at_own) = (entry * half + j * n, own * half + j * n);
+            constant(h, &plus[at..][..n], &plus[at_own..][..n], v);
             if lower {
-                let (q, own) = (&minus[at(entry)], &minus[at(own)]);
+                let (q, own) = (&minus[at..][..n], &minus[at_own..][..n]);
                 for b in 0..n {
                     let minus = T::splat(q[b]).minus(v.relative, T::splat(own[b]));
                     h[b] = T::select(stacked, h[b], minus);
@@ -116,13 +114,13 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
             if j == i {
                 add_row(h, factor, real, n, a, i, v);
             }
-            let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
-            let (fa, fb) = (f * along(&ra[j * n..][..n], a, i, v), f * along(&ib[j * n..][..n], a, i, v));
+            let f = T::splat(strength * r);
+            let (fa, fb) = (f * along(aj, a, i, v), f * along(bj, a, i, v));
             let (first, second, x, y) = if lower { (fb, s * fa, bi, ai) } else { (fa, s * fb, ai, bi) };
             for b in 0..n {
                 h[b] = h[b].plus(first, x[b]).minus(second, y[b]);
             }
-            add_unit(h, a, i, v, self.gram[3 * (i * m + j) + usize::from(lower)]);
+            add_unit(h, a, i, v, gram[usize::from(lower)]);
         }
     }
 }
@@ -155,20 +153,18 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             *x = T::splat(0.0);
         }
         let mut rest = T::splat(0.0);
-        for i in 0..m {
-            let (ai, bi) = (&ra[i * n..(i + 1) * n], &ib[i * n..(i + 1) * n]);
+        let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(delta.chunks_exact_mut(n));
+        for (i, ((ai, bi), di)) in rows.enumerate() {
             let r = T::splat(p.r[i]);
-            for a in 0..n {
+            for (a, (real, imaginary)) in real.chunks_exact_mut(n).zip(imaginary.chunks_exact_mut(n)).enumerate() {
                 let (fa, fb) = (r * ai[a], r * bi[a]);
-                let (real, imaginary) = (&mut real[a * n..][..n], &mut imaginary[a * n..][..n]);
                 for b in 0..n {
                     real[b] = real[b].plus(fa, ai[b]).plus(fb, bi[b]);
                     imaginary[b] = imaginary[b].plus(fa, bi[b]).minus(fb, ai[b]);
                 }
             }
-            let di = &mut delta[i * n..(i + 1) * n];
-            for a in 0..n {
-                di[a] = ai[a] - T::splat(p.fne[i * n + a]);
+            for (b, &f) in p.fne[i * n..][..n].iter().enumerate() {
+                di[b] = ai[b] - T::splat(f);
             }
             rest = rest.plus(T::splat(p.closeness[i]), sum_of_squares(di) + sum_of_squares(bi));
         }
@@ -178,10 +174,10 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let groups = p.coupling.len();
         for (group, w) in p.coupling.iter().enumerate() {
             let e = &mut self.coupled[group * n * n..][..n * n];
-            symmetric_product(e, n, m, &w[..m * n], delta, T::splat(1.0));
+            symmetric_product(e, n, &w[..m * n], delta, T::splat(1.0));
             rest = rest + sum_of_squares(e);
             let e = &mut self.coupled[(groups + group) * n * n..][..n * n];
-            symmetric_product(e, n, m, &w[..m * n], ib, self.sign);
+            symmetric_product(e, n, &w[..m * n], ib, self.sign);
             rest = rest + sum_of_squares(e);
         }
         rest.plus(T::splat(p.gamma[0]), sum_of_squares(real) + sum_of_squares(imaginary))
@@ -195,23 +191,24 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let (out_a, out_b) = out[..2 * m * n].split_at_mut(m * n);
         let (real, imaginary) = self.x[..2 * n * n].split_at(n * n);
         let groups = p.coupling.len();
-        for i in 0..m {
-            let (ai, bi) = (&ra[i * n..(i + 1) * n], &ib[i * n..(i + 1) * n]);
-            let (ga, gb) = (&mut out_a[i * n..(i + 1) * n], &mut out_b[i * n..(i + 1) * n]);
+        let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(self.delta.chunks_exact(n));
+        let slopes = out_a.chunks_exact_mut(n).zip(out_b.chunks_exact_mut(n));
+        for (i, (((ai, bi), di), (ga, gb))) in rows.zip(slopes).enumerate() {
             let c = T::splat(2.0 * p.closeness[i]);
-            for a in 0..n {
-                ga[a] = c * self.delta[i * n + a];
-                gb[a] = c * bi[a];
+            for b in 0..n {
+                ga[b] = c * di[b];
+                gb[b] = c * bi[b];
             }
             let factor = 4.0 * p.gamma[0] * p.r[i];
             add_product(ga, n, T::splat(factor), ai, real);
             add_product(ga, n, T::splat(-factor), bi, imaginary);
             add_product(gb, n, T::splat(factor), ai, imaginary);
             add_product(gb, n, T::splat(factor), bi, real);
-            for (group, w) in p.coupling.iter().enumerate() {
+            let (real, imaginary) = self.coupled[..2 * groups * n * n].split_at(groups * n * n);
+            for ((w, er), ei) in p.coupling.iter().zip(real.chunks_exact(n * n)).zip(imaginary.chunks_exact(n * n)) {
                 let w = &w[i * n..(i + 1) * n];
-                add_weighted(ga, n, w, &self.coupled[group * n * n..][..n * n]);
-                add_weighted(gb, n, w, &self.coupled[(groups + group) * n * n..][..n * n]);
+                add_weighted(ga, n, w, er);
+                add_weighted(gb, n, w, ei);
             }
         }
     }

@@ -61,19 +61,20 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
         let (i, a) = (v.entry / n, v.entry % n);
         let (gi, width, end) = (&g[i * n..][..n], m * n, (i + 1) * n);
         let (q, own) = (&p.quadratic[0][v.entry * width..][..end], &p.quadratic[0][v.own * width..][..end]);
-        let curvature = T::splat(4.0 * p.gamma[0] * p.r[i]);
-        for j in 0..i + 1 {
-            let (gj, h) = (&g[j * n..][..n], &mut out[j * n..][..n]);
-            constant(h, &q[j * n..][..n], &own[j * n..][..n], v);
+        let blocks = q.chunks_exact(n).zip(own.chunks_exact(n)).zip(out.chunks_exact_mut(n));
+        let players = g.chunks_exact(n).zip(&p.r).zip(&self.gram[i * m..]);
+        let (strength, curvature) = (4.0 * p.gamma[0] * p.r[i], T::splat(4.0 * p.gamma[0] * p.r[i]));
+        for (j, (((q, own), h), ((gj, &r), &gram))) in blocks.zip(players).enumerate() {
+            constant(h, q, own, v);
             if j == i {
                 add_row(h, curvature, x, n, a, i, v);
             }
             if GAUSS_NEWTON {
-                let scale = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]) * along(gj, a, i, v);
+                let scale = T::splat(strength * r) * along(gj, a, i, v);
                 for b in 0..n {
                     h[b] = h[b].plus(scale, gi[b]);
                 }
-                add_unit(h, a, i, v, self.gram[i * m + j]);
+                add_unit(h, a, i, v, gram);
             }
         }
     }
@@ -152,25 +153,23 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             *x = T::splat(-t);
         }
         let mut rest = T::splat(0.0);
-        for i in 0..m {
-            let gi = &g[i * n..(i + 1) * n];
-            let r = T::splat(p.r[i]);
-            for a in 0..n {
-                let factor = r * gi[a];
-                for (x, &g) in x[a * n..(a + 1) * n].iter_mut().zip(gi) {
-                    *x = x.plus(factor, g);
+        let rows = g.chunks_exact(n).zip(fne.chunks_exact(n)).zip(delta.chunks_exact_mut(n));
+        for (((gi, fi), di), (&r, &closeness)) in rows.zip(p.r.iter().zip(&p.closeness)) {
+            for (x, &g) in x.chunks_exact_mut(n).zip(gi) {
+                let factor = T::splat(r) * g;
+                for b in 0..n {
+                    x[b] = x[b].plus(factor, gi[b]);
                 }
             }
-            let di = &mut delta[i * n..(i + 1) * n];
-            for a in 0..n {
-                di[a] = gi[a] - T::splat(fne[i * n + a]);
+            for b in 0..n {
+                di[b] = gi[b] - T::splat(fi[b]);
             }
-            rest = rest.plus(T::splat(p.closeness[i]), sum_of_squares(di));
+            rest = rest.plus(T::splat(closeness), sum_of_squares(di));
         }
         let quartic = sum_of_squares(x);
         for (group, w) in p.coupling.iter().enumerate() {
             let e = &mut self.coupled[group * n * n..][..n * n];
-            symmetric_product(e, n, m, &w[..m * n], delta, T::splat(1.0));
+            symmetric_product(e, n, &w[..m * n], delta, T::splat(1.0));
             rest = rest + sum_of_squares(e);
         }
         rest.plus(T::splat(p.gamma[0]), quartic)
@@ -181,15 +180,14 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
         let p = self.problem;
         let (n, m) = self.dimensions();
         let x = &self.x[..n * n];
-        for i in 0..m {
-            let y = &mut out[i * n..(i + 1) * n];
+        let rows = g[..m * n].chunks_exact(n).zip(self.delta.chunks_exact(n)).zip(out.chunks_exact_mut(n));
+        for (i, ((gi, di), y)) in rows.enumerate() {
             let c = T::splat(2.0 * p.closeness[i]);
-            for (y, &d) in y.iter_mut().zip(&self.delta[i * n..(i + 1) * n]) {
-                *y = c * d;
+            for b in 0..n {
+                y[b] = c * di[b];
             }
-            add_product(y, n, T::splat(4.0 * p.gamma[0] * p.r[i]), &g[i * n..(i + 1) * n], x);
-            for (group, w) in p.coupling.iter().enumerate() {
-                let e = &self.coupled[group * n * n..][..n * n];
+            add_product(y, n, T::splat(4.0 * p.gamma[0] * p.r[i]), gi, x);
+            for (w, e) in p.coupling.iter().zip(self.coupled.chunks_exact(n * n)) {
                 add_weighted(y, n, &w[i * n..(i + 1) * n], e);
             }
         }
@@ -228,17 +226,12 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
 
 /// E = WΔ + σ(WΔ)ᵀ, with w and Δ by rows.
 #[inline(always)]
-pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, m: usize, w: &[f64], delta: &[T], sign: T) {
-    for a in 0..n {
-        for (e, &d) in e[a * n..(a + 1) * n].iter_mut().zip(&delta[..n]) {
-            *e = T::splat(w[a]) * d;
-        }
-    }
-    for i in 1..m {
-        for a in 0..n {
-            let factor = T::splat(w[i * n + a]);
-            for (e, &d) in e[a * n..(a + 1) * n].iter_mut().zip(&delta[i * n..(i + 1) * n]) {
-                *e = e.plus(factor, d);
+pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[f64], delta: &[T], sign: T) {
+    for (i, (w, d)) in w.chunks_exact(n).zip(delta.chunks_exact(n)).enumerate() {
+        for (e, &w) in e.chunks_exact_mut(n).zip(w) {
+            let factor = T::splat(w);
+            for b in 0..n {
+                e[b] = if i == 0 { factor * d[b] } else { e[b].plus(factor, d[b]) };
             }
         }
     }
@@ -254,10 +247,10 @@ pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, m: usize, w: &
 /// row += factor · (x E) for a row x and a matrix E.
 #[inline(always)]
 pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T], e: &[T]) {
-    for a in 0..n {
-        let scale = factor * x[a];
-        for (row, &e) in row.iter_mut().zip(&e[a * n..(a + 1) * n]) {
-            *row = row.plus(scale, e);
+    for (e, &x) in e.chunks_exact(n).zip(x) {
+        let scale = factor * x;
+        for b in 0..n {
+            row[b] = row[b].plus(scale, e[b]);
         }
     }
 }
@@ -265,10 +258,10 @@ pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T]
 /// row += 4 · (w E) for a row w of the problem.
 #[inline(always)]
 pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[f64], e: &[T]) {
-    for a in 0..n {
-        let scale = T::splat(4.0 * w[a]);
-        for (row, &e) in row.iter_mut().zip(&e[a * n..(a + 1) * n]) {
-            *row = row.plus(scale, e);
+    for (e, &w) in e.chunks_exact(n).zip(w) {
+        let scale = T::splat(4.0 * w);
+        for b in 0..n {
+            row[b] = row[b].plus(scale, e[b]);
         }
     }
 }
