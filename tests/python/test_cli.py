@@ -34,6 +34,12 @@ def test_help_shows_examples_and_exit_codes(tadcore):
         assert len(out) > 200
 
 
+def test_the_package_runs_as_a_module():
+    done = subprocess.run([sys.executable, "-m", "tadcore", "scenarios"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert scenarios.names()[0] in done.stdout
+
+
 def test_bundled_scenarios_are_listed_and_printed(tadcore):
     code, out, err = tadcore("scenarios")
     assert (code, err) == (0, "")

@@ -90,6 +90,7 @@ mod x86 {
     use std::arch::x86_64::*;
 
     use super::{Pack, Registers};
+    use crate::lanes::transpose;
 
     /// 256 bits.
     pub(in super::super) struct Wide256;
@@ -192,21 +193,6 @@ mod x86 {
         #[inline(always)]
         fn mul_add(self, by: Self, to: Self) -> Self {
             [self[0].mul_add(by[0], to[0]), self[1].mul_add(by[1], to[1])]
-        }
-    }
-
-    #[inline(always)]
-    fn transpose([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
-        // SAFETY: the caller is compiled for this width; registers alone.
-        unsafe {
-            let (ab0, ab1) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
-            let (cd0, cd1) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
-            [
-                _mm256_permute2f128_pd::<0x20>(ab0, cd0),
-                _mm256_permute2f128_pd::<0x20>(ab1, cd1),
-                _mm256_permute2f128_pd::<0x31>(ab0, cd0),
-                _mm256_permute2f128_pd::<0x31>(ab1, cd1),
-            ]
         }
     }
 
