@@ -4,10 +4,11 @@ The text must occur once in its file. The part is an expression, or a statement 
 """
 
 import of_games
+import of_lanes
 import of_riccati
 import of_synthesis
 
-MUTANTS = of_riccati.MUTANTS | of_synthesis.MUTANTS | of_games.MUTANTS
+MUTANTS = of_riccati.MUTANTS | of_lanes.MUTANTS | of_synthesis.MUTANTS | of_games.MUTANTS
 
 # Mutants that no test can tell from the program: (file, formula): why.
 EQUIVALENT = {
