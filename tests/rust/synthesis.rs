@@ -193,3 +193,24 @@ fn the_papers_gains_give_the_same_velocities() {
         }
     }
 }
+
+/// Θ times a number has the same relative gradient (times a power of four, to the bit), and no iteration is too few but
+/// where the start is stationary.
+#[test]
+fn what_is_reached_is_relative_and_says_why_it_ended() {
+    for instant in instants() {
+        let weights = instant.game.constrained_control_weights();
+        let gamma = instant.game.weights().gamma.iter().map(|g| 1024.0 * g).collect();
+        let scaled = Problem::from_parts(instant.game.interaction(), weights, gamma, instant.equilibrium.node(0));
+        let (mut stopped, options) = (0, Options { method: Method::Descent, max_iterations: 0 });
+        for topology in networks(&instant, 12, 6) {
+            let one = instant.solve(&topology, options);
+            let other = Synthesizer::new().solve(&scaled, &topology, options);
+            assert_eq!((one.gradient_norm, one.status), (other.gradient_norm, other.status), "{topology:?}");
+            let stationary = one.gradient_norm <= 1e-10;
+            assert_eq!(one.status, if stationary { Status::Converged } else { Status::IterationLimit }, "{topology:?}");
+            stopped += usize::from(!stationary);
+        }
+        assert!(stopped > 5, "{stopped}");
+    }
+}

@@ -225,3 +225,46 @@ fn doubled_gains_are_complex_or_stacked() {
         }
     }
 }
+
+/// What cancels in ∇Θ and in Θ is no larger than the sizes that their rounding is measured by, one term at a time.
+#[test]
+fn sizes_bound_the_parts_that_cancel() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (sampled, p, points) = sample(interaction);
+        let (n, m) = (sampled.size(), sampled.rows());
+        for term in 0..interaction.terms() {
+            let mut gamma = vec![0.0; interaction.terms()];
+            gamma[term] = 0.7;
+            let problem = Problem::from_parts(interaction, sampled.r.clone(), gamma, &p);
+            let mut objective = RealGains::<f64, 0>::new(&problem);
+            let zero = objective.value(&vec![0.0; m * n]);
+            assert!(zero <= problem.value_scale() * (1.0 + 1e-14), "{interaction:?} {term}");
+            for size in [1e-3, 1.0, 1e3] {
+                let g: Vec<f64> = points[..m * n].iter().map(|x| size * x).collect();
+                objective.value(&g);
+                let scale = objective.gradient_scale(&g);
+                // 4γ₁RGM, then what is linear in Δ = G − F, at G and at F: the gradient is affine without the first term.
+                let rgm: f64 = (0..m * n)
+                    .map(|e| {
+                        let (i, b) = (e / n, e % n);
+                        let row: f64 = (0..n).map(|a| g[i * n + a] * problem.target[a * n + b]).sum();
+                        (4.0 * problem.gamma[0] * problem.r[i] * row).powi(2)
+                    })
+                    .sum();
+                assert!(rgm.sqrt() <= scale, "{interaction:?} {term} {size}");
+                if term > 0 {
+                    let mut slope = |g: &[f64]| {
+                        let mut slope = vec![0.0; m * n];
+                        objective.value(g);
+                        objective.gradient(g, &mut slope);
+                        slope
+                    };
+                    let (at, of_f) = (slope(&g), slope(&vec![0.0; m * n]));
+                    let of_g: f64 = at.iter().zip(&of_f).map(|(a, f)| (a - f).powi(2)).sum();
+                    let of_f: f64 = of_f.iter().map(|f| f * f).sum();
+                    assert!(of_g.sqrt() + of_f.sqrt() <= scale, "{interaction:?} {term} {size}");
+                }
+            }
+        }
+    }
+}

@@ -311,16 +311,18 @@ mod tests {
 
     #[test]
     fn both_factorisations_solve_the_same_system() {
-        for d in [1, 2, 5, 12, 95, 128, LIBRARY_SIZE, LIBRARY_SIZE + 2] {
+        for (d, damping) in
+            [1, 2, 5, 12, 95, 128, LIBRARY_SIZE, LIBRARY_SIZE + 2].into_iter().flat_map(|d| [(d, 0.25), (d, 0.0)])
+        {
             let entry = |i: usize, j: usize| 1.0 / (1.0 + (i - j) as f64) + if i == j { 2.0 } else { 0.0 };
-            let damped = |i: usize, j: usize| entry(i.max(j), i.min(j)) + if i == j { 0.25 } else { 0.0 };
+            let damped = |i: usize, j: usize| entry(i.max(j), i.min(j)) + if i == j { damping } else { 0.0 };
             let (h, layout) = (lower(d, entry), layout(d));
             let full = layout.len();
             let mut b: Vec<f64> = (0..d).map(|i| (i as f64 + 1.0).sin()).collect();
             b.resize(full, 0.0);
             for means in means() {
                 let (mut f, mut x) = (vec![f64::NAN; full * full], b.clone());
-                assert!(factorise(&h, 0.25, &layout, means, &mut f).0);
+                assert!(factorise(&h, damping, &layout, means, &mut f).0);
                 let form = forward(&f, full, &mut x);
                 back(&f, full, &mut x);
                 for i in 0..d {
@@ -339,14 +341,11 @@ mod tests {
             [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
         {
             for second in [2.0, 1.0] {
-                let h = lower(d, |i, j| {
-                    if i == j {
-                        1.0
-                    } else if (i, j) == (1, 0) {
-                        second
-                    } else {
-                        0.0
-                    }
+                // Two pairs of rows, each with a pivot of 1 − x²; the first counts.
+                let h = lower(d, |i, j| match (i, j) {
+                    (1, 0) => second,
+                    (3, 2) => 3.0,
+                    _ => f64::from(u8::from(i == j)),
                 });
                 let layout = layout(d);
                 let mut f = vec![0.0; layout.len() * layout.len()];
@@ -354,6 +353,18 @@ mod tests {
                 assert!(!definite, "{d} {second}");
                 assert!(means.library && d >= LIBRARY_SIZE || lack == second * second - 1.0, "{d} {lack}");
             }
+        }
+    }
+
+    #[test]
+    fn damping_lifts_a_negative_matrix() {
+        for (d, means) in
+            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
+        {
+            let (h, layout) = (lower(d, |i, j| if i == j { -0.5 } else { 0.0 }), layout(d));
+            let mut f = vec![0.0; layout.len() * layout.len()];
+            assert!(!factorise(&h, 0.25, &layout, means, &mut f).0, "{d}");
+            assert!(factorise(&h, 1.0, &layout, means, &mut f).0, "{d}");
         }
     }
 }
