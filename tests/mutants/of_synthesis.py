@@ -53,7 +53,7 @@ MUTANTS = {
         ("size of ∇Θ: ‖G‖ and ‖F‖", "(«size + T::splat(s.fne)»)", "size - T::splat(s.fne)"),
         (
             "∇²Θ: r_i in g_jᵀg_i",
-            "let (strength, curvature) = («4.0 * p.gamma[0] * p.r[i]»,",
+            "let strength = «4.0 * p.gamma[0] * p.r[i]»;\n        for (j, (((q",
             "-4.0 * p.gamma[0] * p.r[i]",
         ),
         ("∇²Θ: r_j in g_jᵀg_i", "T::splat(«strength * r») * along", "strength / r"),
@@ -66,7 +66,7 @@ MUTANTS = {
         ),
         ("∇²Θ: GGᵀ", "dot(&g[i * n..][..n], «&g[j * n..][..n]»)", "&g[i * n..][..n]"),
         ("∇²Θ: (GGᵀ)_ij **I**", "add_unit(h, a, i, v, «gram»)", "T::splat(0.0) - gram"),
-        ("∇²Θ: r_i X", "p.r[i], T::splat(«4.0 * p.gamma[0] * p.r[i]»));", "-4.0 * p.gamma[0] * p.r[i]"),
+        ("∇²Θ: r_i X", "add_row(h, T::splat(«strength»), x", "-strength"),
         ("∇²Θ: δ_ij", "if «j == i» {", "j != i"),
         ("certificate: no Gauss–Newton part", "if «GAUSS_NEWTON» {", "true"),
         ("certificate: X at its point", "product::<false>(«&self.0.x», g", "&self.0.kept"),

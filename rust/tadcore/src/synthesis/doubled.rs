@@ -37,7 +37,7 @@ pub(super) struct Doubled<'a, T, const N: usize> {
     delta: Vec<T>,
     /// E_r of every group, then E_i of every group.
     coupled: Vec<T>,
-    /// What stands before **I** in the Hessian's blocks AA, BB and BA at its point, m × m times three.
+    /// What stands before **I** in the Hessian's blocks AA, BB and BA at its point, m × m times three; those of AA and BB for j ≤ i.
     gram: Vec<T>,
     /// The gradient's scale, one for each lane.
     scale: T,
@@ -229,9 +229,11 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             for j in 0..m {
                 let (aj, bj) = (&ra[j * n..][..n], &ib[j * n..][..n]);
                 let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
-                let (aa, bb) = (dot(ai, aj), dot(bi, bj));
                 let gram = &mut self.gram[3 * (i * m + j)..][..3];
-                (gram[0], gram[1]) = (f * (aa + s * bb), f * (bb + s * aa));
+                if j <= i {
+                    let (aa, bb) = (dot(ai, aj), dot(bi, bj));
+                    (gram[0], gram[1]) = (f * (aa + s * bb), f * (bb + s * aa));
+                }
                 gram[2] = f * (dot(bi, aj) - s * dot(ai, bj));
             }
         }

@@ -63,11 +63,11 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
         let (q, own) = (&p.quadratic[0][v.entry * width..][..end], &p.quadratic[0][v.own * width..][..end]);
         let blocks = q.chunks_exact(n).zip(own.chunks_exact(n)).zip(out.chunks_exact_mut(n));
         let players = g.chunks_exact(n).zip(&p.r).zip(&self.gram[i * m..]);
-        let (strength, curvature) = (4.0 * p.gamma[0] * p.r[i], T::splat(4.0 * p.gamma[0] * p.r[i]));
+        let strength = 4.0 * p.gamma[0] * p.r[i];
         for (j, (((q, own), h), ((gj, &r), &gram))) in blocks.zip(players).enumerate() {
             constant(h, q, own, v);
             if j == i {
-                add_row(h, curvature, x, n, a, i, v);
+                add_row(h, T::splat(strength), x, n, a, i, v);
             }
             if GAUSS_NEWTON {
                 let scale = T::splat(strength * r) * along(gj, a, i, v);

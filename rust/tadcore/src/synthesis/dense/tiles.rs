@@ -53,8 +53,9 @@ pub(super) fn factorise(h: &[f64], damping: f64, used: usize, d: usize, f: &mut 
         for i in 0..GROUP {
             // What lies behind the diagonal is the next rows', and not used.
             let row = load(h, packed(first + i) + first);
-            let on = _mm256_cmpeq_epi64(own, _mm256_set1_epi64x(i as i64));
-            rows[i] = _mm256_add_pd(row, _mm256_and_pd(_mm256_castsi256_pd(on), _mm256_set1_pd(damping)));
+            let on = _mm256_castsi256_pd(_mm256_cmpeq_epi64(own, _mm256_set1_epi64x(i as i64)));
+            // Not even the sign of a zero beside the diagonal changes.
+            rows[i] = _mm256_blendv_pd(row, _mm256_add_pd(row, _mm256_set1_pd(damping)), on);
         }
         rows = subtract(rows, first, first, f, d);
         for i in 0..GROUP {
