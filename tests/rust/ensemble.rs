@@ -5,8 +5,10 @@ use tadcore::cancel::CancelToken;
 use tadcore::ensemble::{self, Batch};
 use tadcore::error::{RunError, TableError};
 use tadcore::game::{Interaction, bank};
+use tadcore::network::Topology;
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{Outcome, Setup, simulate};
+use tadcore::synthesis::{Options, Synthesizer};
 
 /// Numbers in [0, 1), one after another (SplitMix64).
 struct Draws(u64);
@@ -36,10 +38,16 @@ struct Case {
 
 /// M random games of n defenders; their radii differ from trial to trial, or are shared.
 fn case(interaction: Interaction, n: usize, dim: usize, trials: usize, shared: bool, bytes: usize) -> Case {
+    let r_d = (0..n).map(|i| 0.8 + 0.3 * (i % 3) as f64).collect();
+    case_of(interaction, r_d, dim, trials, shared, bytes)
+}
+
+/// The same for given control weights of the defenders.
+fn case_of(interaction: Interaction, r_d: Vec<f64>, dim: usize, trials: usize, shared: bool, bytes: usize) -> Case {
+    let n = r_d.len();
     // Unit weights in I2 escape early: at 0.31 with five defenders, at 0.16 with seven.
     let horizon = if interaction == Interaction::I2 && n > 3 { 0.1 } else { 1.5 };
     let mut draws = Draws(1000 * n as u64 + dim as u64);
-    let r_d = (0..n).map(|i| 0.8 + 0.3 * (i % 3) as f64).collect();
     let game = bank::unit_game(interaction, r_d, 1.2, 0.8, 1.0, horizon, 0.01).expect("a valid game");
     let m = game.constrained();
     let rows = if shared { 1 } else { trials };
@@ -128,6 +136,86 @@ fn threads_and_the_table_change_nothing() {
             assert_eq!(small.play(threads), ends, "{bytes} bytes");
         }
         assert!(small.policy.table().bytes <= bytes, "{:?}", small.policy.table());
+    }
+}
+
+/// Defenders of one kind change places: fewer syntheses than entries, and the same bits whoever asked first.
+#[test]
+fn equal_defenders_share_their_answers() {
+    for (interaction, n, trials) in [(Interaction::I1, 3, 300), (Interaction::I2, 3, 60), (Interaction::I1, 5, 20)] {
+        let make = |bytes| case_of(interaction, vec![1.0; n], 2, trials, true, bytes);
+        let reference = make(DEFAULT_TABLE_BYTES);
+        let ends = reference.play(1);
+        assert_eq!(ends, reference.one_by_one(), "{interaction:?} {n}");
+        let stats = reference.policy.table();
+        // The recorded runs solve for themselves; what they add is as much as they miss.
+        let fresh = make(DEFAULT_TABLE_BYTES);
+        assert_eq!(fresh.play(1), ends);
+        assert!(fresh.policy.table().misses < fresh.policy.table().entries as u64, "{stats:?}");
+        for threads in [2, 3] {
+            let other = make(DEFAULT_TABLE_BYTES);
+            assert_eq!(other.play(threads), ends, "{threads} threads");
+            assert_eq!(other.policy.table().entries, fresh.policy.table().entries, "{threads} threads");
+            assert_eq!(sorted(&other.policy), sorted(&fresh.policy), "{threads} threads");
+        }
+        for bytes in [0, 20_000] {
+            assert_eq!(make(bytes).play(2), ends, "{bytes} bytes");
+        }
+        // Half of the trials first, in the other direction: others ask first, and every entry has the same bits.
+        let split = make(DEFAULT_TABLE_BYTES);
+        let width = 2 * (n + 2);
+        let last = Batch { positions: &split.positions[trials / 2 * width..], ..split.batch() };
+        ensemble::run(&split.policy, &last, Some(1), &CancelToken::new()).expect("a batch");
+        assert_eq!(split.play(1), ends);
+        assert_eq!(sorted(&split.policy), sorted(&fresh.policy));
+    }
+}
+
+/// The entries of a saved table in order, without the checksum.
+fn sorted(policy: &Policy) -> Vec<Vec<u8>> {
+    let bytes = policy.save_transitions();
+    let words = (policy.game().constrained() * policy.game().size()).div_ceil(64);
+    let len = 8 * (1 + words + policy.game().size().pow(2));
+    let mut entries: Vec<Vec<u8>> = bytes[40..bytes.len() - 8].chunks_exact(len).map(<[u8]>::to_vec).collect();
+    entries.sort();
+    entries
+}
+
+/// The gains of a relabelled network are the relabelled gains, to the bit where only one relabelling leads there, and those
+/// that the network itself leads to without any sharing, to rounding.
+#[test]
+fn relabelled_networks_have_relabelled_gains() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let game = bank::unit_game(interaction, vec![1.0, 1.0, 1.3, 1.0], 1.2, 0.8, 1.0, 0.2, 0.05).expect("a game");
+        let (m, n) = (game.constrained(), game.size());
+        let policy = Policy::new(game, 0, &CancelToken::new()).expect("an equilibrium");
+        let mut solver = Synthesizer::new();
+        let (mut draws, mut compared) = (Draws(5), 0);
+        for _ in 0..60 {
+            let density = draws.next();
+            let seen: Vec<bool> = (0..m * n).map(|_| draws.next() < density).collect();
+            let topology = Topology::from_fn(m, n, |i, j| seen[i * n + j]);
+            let own = policy.solve(2, &topology, &mut solver);
+            let orders = [[1, 0, 2, 3, 4], [3, 1, 2, 0, 4], [0, 3, 2, 1, 4], [1, 3, 2, 0, 4], [3, 0, 2, 1, 4]];
+            let symmetric = orders.iter().any(|order| topology.relabelled(order) == topology);
+            for order in orders.iter().filter(|_| !symmetric) {
+                compared += 1;
+                let other = policy.solve(2, &topology.relabelled(order), &mut solver);
+                for (i, row) in other.transition.chunks_exact(n).enumerate() {
+                    assert!((0..n).all(|j| row[j] == own.transition[order[i] * n + order[j]]));
+                }
+                for (i, row) in other.gains.rows.chunks_exact(n).enumerate() {
+                    assert!((0..n).all(|j| row[j] == own.gains.rows[order[i] * n + order[j]]));
+                }
+                assert!((0..n).all(|j| other.attacker[j] == own.attacker[order[j]]));
+            }
+            let alone = solver.solve(&policy.problem(2), &topology, Options::default());
+            assert!((alone.theta - own.gains.theta).abs() <= 1e-9 * alone.theta + 1e-20, "{topology:?}");
+            for (a, b) in alone.rows.iter().zip(&own.gains.rows) {
+                assert!((a - b).abs() < 1e-7, "{topology:?}");
+            }
+        }
+        assert!(compared > 150, "{compared}");
     }
 }
 

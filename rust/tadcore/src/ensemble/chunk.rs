@@ -26,6 +26,8 @@ pub(super) struct Worker {
     filler: Filler,
     local: Shelf,
     keys: Keys,
+    /// The words of one key.
+    words: Vec<u64>,
     missing: Vec<Topology>,
     waiting: Vec<usize>,
 }
@@ -37,6 +39,7 @@ impl Worker {
             filler: Filler::default(),
             local: Shelf::new(rows, size),
             keys: vec![[0; LANES]; (rows * size).div_ceil(64)],
+            words: Vec::new(),
             missing: Vec::new(),
             waiting: Vec::new(),
         }
@@ -119,9 +122,10 @@ impl<'a> Chunk<'a> {
                 }
                 Stop::Missing(strip) => {
                     for lane in 0..LANES {
-                        let words: Vec<u64> = w.keys.iter().map(|word| word[lane]).collect();
-                        if shelf.find(&words) == 0 {
-                            w.missing.push(Topology::from_words(self.shape.rows, self.shape.size, &words));
+                        w.words.clear();
+                        w.words.extend(w.keys.iter().map(|word| word[lane]));
+                        if shelf.find(&w.words) == 0 {
+                            w.missing.push(Topology::from_words(self.shape.rows, self.shape.size, &w.words));
                         }
                     }
                     w.waiting.push(strip);
@@ -139,10 +143,11 @@ impl<'a> Chunk<'a> {
                 continue;
             }
             for lane in 0..LANES {
-                let words: Vec<u64> = w.keys.iter().map(|word| word[lane]).collect();
-                if w.local.find(&words) == 0 {
-                    let held = shelf.find(&words) as usize;
-                    w.local.insert(&words, shelf.matrix(held));
+                w.words.clear();
+                w.words.extend(w.keys.iter().map(|word| word[lane]));
+                if w.local.find(&w.words) == 0 {
+                    let held = shelf.find(&w.words) as usize;
+                    w.local.insert(&w.words, shelf.matrix(held));
                 }
             }
             let moved = self.alone(strip, &w.local, &mut w.keys);

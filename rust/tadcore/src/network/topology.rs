@@ -111,6 +111,22 @@ impl Topology {
         self.sees(i, i)
     }
 
+    /// The network of the same players under other names: its player i is player `order`\[i] here.
+    #[must_use]
+    pub fn relabelled(&self, order: &[usize]) -> Self {
+        let Words::Inline(word) = self.words else {
+            return Self::from_fn(self.rows, self.size, |i, j| self.sees(order[i], order[j]));
+        };
+        let mut out = 0;
+        for (i, &row) in order[..self.rows].iter().enumerate() {
+            let seen = word >> (row * self.size);
+            for (j, &other) in order[..self.size].iter().enumerate() {
+                out |= (seen >> other & 1) << (i * self.size + j);
+            }
+        }
+        Self { words: Words::Inline(out), ..*self }
+    }
+
     /// Sets entry (i, j) of 𝒜.
     pub fn set(&mut self, i: usize, j: usize) {
         let bit = i * self.size + j;

@@ -14,6 +14,7 @@
 mod budget;
 pub mod closed_loop;
 pub mod exponential;
+mod relabelling;
 mod saved;
 pub(crate) mod shelf;
 mod table;
@@ -31,6 +32,7 @@ use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
 use budget::Budget;
+use relabelling::Relabellings;
 use table::Table;
 use transitions::Transitions;
 
@@ -56,6 +58,7 @@ impl StepPolicy {
 pub struct Policy {
     game: Game,
     equilibrium: Equilibrium,
+    relabellings: Relabellings,
     budget: Budget,
     table: Table,
     transitions: Transitions,
@@ -71,7 +74,8 @@ impl Policy {
         let steps = game.grid().steps();
         let (table, budget) = (Table::new(steps + 1), Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size());
-        Ok(Self { game, equilibrium, budget, table, transitions })
+        let relabellings = Relabellings::of(&game);
+        Ok(Self { game, equilibrium, relabellings, budget, table, transitions })
     }
 
     /// The game.
@@ -128,16 +132,31 @@ impl Policy {
         entry
     }
 
+    /// The gains at (step, topology) by any method, without looking at the table.
+    #[must_use]
+    pub fn gains(&self, step: usize, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
+        let (first, order) = self.relabellings.first(topology);
+        let gains = solver.solve(&self.problem(step), &first, options);
+        Gains { rows: relabelling::back(order, &gains.rows), ..gains }
+    }
+
     /// Solves (step, topology) without looking at the table.
     #[must_use]
     pub fn solve(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> StepPolicy {
+        let (first, order) = self.relabellings.first(topology);
         let n = self.game.size();
-        let gains = solver.solve(&self.problem(step), topology, Options::default());
+        let gains = solver.solve(&self.problem(step), &first, Options::default());
         let free = self.free_rows(step);
         let mut c = vec![0.0; n * n];
         closed_loop::matrix(&free, &gains.rows, &mut c);
         let (mut transition, mut attacker) = (vec![0.0; n * n], vec![0.0; n]);
         exponential::exponential(&c, &free.attacker, self.game.grid().step(), &mut transition, &mut attacker);
-        StepPolicy { gains, transition, attacker }
+        let mut own = vec![0.0; n];
+        order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
+        StepPolicy {
+            gains: Gains { rows: relabelling::back(order, &gains.rows), ..gains },
+            transition: relabelling::back(order, &transition),
+            attacker: own,
+        }
     }
 }

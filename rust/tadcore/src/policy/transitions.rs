@@ -133,6 +133,20 @@ struct Instant {
     solved: u64,
 }
 
+/// An entry that nobody has, and the one that is solved for it.
+struct Unknown<'a> {
+    topology: &'a Topology,
+    first: Topology,
+    order: &'a [usize],
+}
+
+impl<'a> Unknown<'a> {
+    fn new(policy: &'a Policy, topology: &'a Topology) -> Self {
+        let (first, order) = policy.relabellings.first(topology);
+        Self { topology, first, order }
+    }
+}
+
 /// What a thread needs to solve entries.
 #[derive(Debug, Default)]
 pub(crate) struct Filler {
@@ -155,62 +169,109 @@ impl Policy {
         cancel: &CancelToken,
     ) -> Result<u64, Cancelled> {
         let claims = &self.transitions.claims[step];
-        let held = |topology: &Topology| self.transitions.shelf(step).find(topology.words()) != 0;
+        let unknown = missing.iter().filter(|topology| !self.supply(step, topology, local, &mut filler.padded));
+        let mut unknown: Vec<Unknown> = unknown.map(|topology| Unknown::new(self, topology)).collect();
+        // Those with many unknowns first: the quick ones fill the lanes to the end.
+        unknown.sort_by(|a, b| (b.first.edges(), &b.first).cmp(&(a.first.edges(), &a.first)));
+        unknown.dedup_by(|a, b| a.first == b.first);
         let group = if self.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
-        let group = missing.len().div_ceil(missing.len().div_ceil(group).max(1)).max(1);
+        let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
         let mut instant = Instant { problem: self.problem(step), free: self.free_rows(step), step, solved: 0 };
-        for group in missing.chunks(group) {
+        for group in unknown.chunks(group) {
             cancel.check()?;
-            let claimed: Vec<Claim> = group.iter().filter_map(|topology| claims.claim(topology)).collect();
-            let mine: Vec<&Topology> = claimed.iter().map(|claim| claim.topology).filter(|t| !held(t)).collect();
+            let claimed: Vec<(Claim, &Unknown)> =
+                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.first)?, wanted))).collect();
+            let mut mine: Vec<&Unknown> = claimed.iter().map(|&(_, wanted)| wanted).collect();
+            mine.retain(|wanted| !self.supply(step, wanted.topology, local, &mut filler.padded));
             self.solve_group(&mut instant, &mine, local, filler);
         }
+        for wanted in &unknown {
+            claims.wait(&wanted.first, cancel)?;
+        }
         for topology in missing {
-            claims.wait(topology, cancel)?;
             // Past the budget, or left by a thread that was cancelled.
-            if !held(topology) && local.find(topology.words()) == 0 {
-                self.solve_group(&mut instant, &[topology], local, filler);
+            if !self.supply(step, topology, local, &mut filler.padded) {
+                self.solve_group(&mut instant, &[&Unknown::new(self, topology)], local, filler);
             }
         }
         Ok(instant.solved)
     }
 
-    /// Solves entries of one instant together and stores them.
-    fn solve_group(&self, instant: &mut Instant, topologies: &[&Topology], local: &mut Shelf, filler: &mut Filler) {
-        let (n, step) = (self.game.size(), instant.step);
-        instant.solved += topologies.len() as u64;
-        let mut store = |topology: &Topology, matrix: &[f64], padded: &mut Vec<f64>| {
-            pad(matrix, n, padded);
-            if !self.transitions.keep(step, topology.words(), padded, &self.budget) {
-                local.insert(topology.words(), padded);
-            }
+    /// Makes an entry available that is there already, under its own name or another; says whether it is.
+    fn supply(&self, step: usize, topology: &Topology, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
+        let shelf = self.transitions.shelf(step);
+        let lookup = |local: &Shelf, words: &[u64]| match (shelf.find(words), local.find(words)) {
+            (0, 0) => None,
+            (0, slot) => Some((true, slot as usize)),
+            (slot, _) => Some((false, slot as usize)),
         };
+        if lookup(local, topology.words()).is_some() {
+            return true;
+        }
+        let mut others = self.relabellings.others().map(|order| topology.relabelled(order));
+        let Some((other, mine, slot)) = others.find_map(|other| {
+            let (mine, slot) = lookup(local, other.words())?;
+            Some((other, mine, slot))
+        }) else {
+            return false;
+        };
+        let from = if mine { local.matrix(slot) } else { shelf.matrix(slot) };
+        let (to, of) = (self.relabellings.first(topology).1, self.relabellings.first(&other).1);
+        let rows = padded(self.game.size());
+        matrix.clear();
+        matrix.resize(from.len(), 0.0);
+        for (&j, &other_j) in to.iter().zip(of) {
+            for (&i, &other_i) in to.iter().zip(of) {
+                matrix[j * rows + i] = from[other_j * rows + other_i];
+            }
+        }
+        drop(shelf);
+        self.store(step, topology, local, matrix);
+        true
+    }
+
+    /// Stores an entry in the table or, where the budget is used up, in `local`.
+    fn store(&self, step: usize, topology: &Topology, local: &mut Shelf, matrix: &[f64]) {
+        if !self.transitions.keep(step, topology.words(), matrix, &self.budget) {
+            local.insert(topology.words(), matrix);
+        }
+    }
+
+    /// Solves entries of one instant together and stores them.
+    fn solve_group(&self, instant: &mut Instant, wanted: &[&Unknown], local: &mut Shelf, filler: &mut Filler) {
+        let (n, step) = (self.game.size(), instant.step);
+        instant.solved += wanted.len() as u64;
         let mut unknown = Vec::new();
-        for &topology in topologies {
-            match self.table.peek(step, topology) {
-                Some(known) => store(topology, &known.transition, &mut filler.padded),
-                None => unknown.push(topology.clone()),
+        for &wanted in wanted {
+            match self.table.peek(step, wanted.topology) {
+                Some(known) => {
+                    pad(&known.transition, self.relabellings.none(), &mut filler.padded);
+                    self.store(step, wanted.topology, local, &filler.padded);
+                }
+                None => unknown.push(wanted),
             }
         }
         filler.square.resize(n * n, 0.0);
         filler.closed_loop.resize(n * n, 0.0);
         filler.row.resize(n, 0.0);
         let Filler { solver, closed_loop, square, row, padded } = filler;
-        solver.solve_all(&instant.problem, &unknown, crate::synthesis::Options::default(), |index, gains| {
+        let firsts: Vec<Topology> = unknown.iter().map(|wanted| wanted.first.clone()).collect();
+        solver.solve_all(&instant.problem, &firsts, crate::synthesis::Options::default(), |index, gains| {
             super::closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
             super::exponential::exponential(closed_loop, &instant.free.attacker, self.game.grid().step(), square, row);
-            store(&unknown[index], square, padded);
+            pad(square, unknown[index].order, padded);
+            self.store(step, unknown[index].topology, local, padded);
         });
     }
 }
 
-/// A row-major matrix by columns, each padded with zeros.
-fn pad(matrix: &[f64], n: usize, out: &mut Vec<f64>) {
-    let rows = padded(n);
+/// A row-major matrix of a relabelled game by columns under their own names, each padded with zeros.
+fn pad(matrix: &[f64], order: &[usize], out: &mut Vec<f64>) {
+    let (n, rows) = (order.len(), padded(order.len()));
     out.clear();
     out.resize(n * rows, 0.0);
-    for (i, row) in matrix.chunks_exact(n).enumerate() {
-        for (j, &x) in row.iter().enumerate() {
+    for (row, &i) in matrix.chunks_exact(n).zip(order) {
+        for (&x, &j) in row.iter().zip(order) {
             out[j * rows + i] = x;
         }
     }

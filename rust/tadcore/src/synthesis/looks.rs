@@ -38,7 +38,7 @@ const FAR: f64 = 1.0;
 /// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
 const LONGEST_STEP: f64 = 0.3;
 /// Relative gradient at which a second or third look has found its basin.
-const BASIN: f64 = 1e-6;
+const BASIN: f64 = 1e-4;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
 /// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
