@@ -1,6 +1,16 @@
 """The mutants of steps, networks, runs, costs and batches; `listed.py` says how to read a row."""
 
 MUTANTS = {
+    "policy/relabelling.rs": [
+        ("rows of a model", "out[«order[i] * n + order[j]»]", "order[j] * n + order[i]"),
+        ("who is alike", ".find(|&j| «same(i, j)»)", "!same(i, j)"),
+        ("seen by whom", "next[j].wrapping_add(mix(«!colours[i]»))", "colours[i]"),
+        ("places of a kind", "order[«place»] = player", "player"),
+    ],
+    "policy/transitions.rs": [
+        ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),
+        ("a solved entry under its own name", "out[«j * rows + i»] = x", "i * rows + j"),
+    ],
     "policy/closed_loop.rs": [
         (
             "u_a",

@@ -147,7 +147,7 @@ impl<'a> Chunk<'a> {
                 w.words.extend(w.keys.iter().map(|word| word[lane]));
                 if w.local.find(&w.words) == 0 {
                     let held = shelf.find(&w.words) as usize;
-                    w.local.insert(&w.words, shelf.matrix(held));
+                    w.local.insert(&w.words, None, shelf.matrix(held));
                 }
             }
             let moved = self.alone(strip, &w.local, &mut w.keys);

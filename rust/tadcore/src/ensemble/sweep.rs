@@ -325,7 +325,7 @@ mod tests {
         let mut shelf = Shelf::new(3, 4);
         for key in (0..1 << 12).filter(|key| key % 41 != 3) {
             let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
-            shelf.insert(&[key as u64], &matrix);
+            shelf.insert(&[key as u64], None, &matrix);
         }
         let strips = || Strips {
             z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),

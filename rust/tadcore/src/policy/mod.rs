@@ -32,7 +32,7 @@ use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
 use budget::Budget;
-use relabelling::Relabellings;
+use relabelling::Kinds;
 use table::Table;
 use transitions::Transitions;
 
@@ -58,7 +58,7 @@ impl StepPolicy {
 pub struct Policy {
     game: Game,
     equilibrium: Equilibrium,
-    relabellings: Relabellings,
+    kinds: Kinds,
     budget: Budget,
     table: Table,
     transitions: Transitions,
@@ -74,8 +74,8 @@ impl Policy {
         let steps = game.grid().steps();
         let (table, budget) = (Table::new(steps + 1), Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size());
-        let relabellings = Relabellings::of(&game);
-        Ok(Self { game, equilibrium, relabellings, budget, table, transitions })
+        let kinds = Kinds::of(&game);
+        Ok(Self { game, equilibrium, kinds, budget, table, transitions })
     }
 
     /// The game.
@@ -135,17 +135,17 @@ impl Policy {
     /// The gains at (step, topology) by any method, without looking at the table.
     #[must_use]
     pub fn gains(&self, step: usize, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
-        let (first, order) = self.relabellings.first(topology);
-        let gains = solver.solve(&self.problem(step), &first, options);
-        Gains { rows: relabelling::back(order, &gains.rows), ..gains }
+        let (model, order) = self.kinds.model(topology);
+        let gains = solver.solve(&self.problem(step), &model, options);
+        Gains { rows: relabelling::back(&order, &gains.rows), ..gains }
     }
 
     /// Solves (step, topology) without looking at the table.
     #[must_use]
     pub fn solve(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> StepPolicy {
-        let (first, order) = self.relabellings.first(topology);
+        let (model, order) = self.kinds.model(topology);
         let n = self.game.size();
-        let gains = solver.solve(&self.problem(step), &first, Options::default());
+        let gains = solver.solve(&self.problem(step), &model, Options::default());
         let free = self.free_rows(step);
         let mut c = vec![0.0; n * n];
         closed_loop::matrix(&free, &gains.rows, &mut c);
@@ -154,8 +154,8 @@ impl Policy {
         let mut own = vec![0.0; n];
         order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
         StepPolicy {
-            gains: Gains { rows: relabelling::back(order, &gains.rows), ..gains },
-            transition: relabelling::back(order, &transition),
+            gains: Gains { rows: relabelling::back(&order, &gains.rows), ..gains },
+            transition: relabelling::back(&order, &transition),
             attacker: own,
         }
     }

@@ -1,28 +1,41 @@
 //! Players of one kind: topologies that differ by their names alone share one answer.
 //!
 //! Defenders with the same weights may change places. A relabelling of them carries the gains of one topology into those of
-//! another, and the transition with them, so one synthesis serves all. Which one is solved is a function of the topology
-//! alone, whoever asks: the *first* of its relabellings as numbers. Between them nothing is computed, numbers only change
-//! their places, so the answer has the same bits on every way there.
+//! another, and the transition with them, so one synthesis serves all. Which one is solved, the *model*, is a function of the
+//! topology alone, whoever asks: defenders of a kind in the order of their colours. Between a topology and its model nothing
+//! is computed, numbers only change their places, so the answer has the same bits on every way there.
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
 //! | π | an order | player i of the relabelled game is player π(i) of the other |
+//!
+//! A colour is a number that a player keeps under every relabelling: whom it sees and by whom it is seen, and the colours
+//! of those (Weisfeiler and Leman). Players that differ and have one colour all the same keep their order: the
+//! topology then shares with fewer others, and is none the worse for it.
 
 use crate::game::Game;
 use crate::network::Topology;
 
-/// Relabellings up to which the first one is looked for: six equal defenders. Beyond, the search takes as long as it saves,
-/// and in so large a network two trials hardly meet.
-const MOST: usize = 720;
+/// How often colours look at their neighbours'.
+const ROUNDS: usize = 2;
 
-/// The relabellings that leave a game as it is, first the one that changes nothing.
+/// Which defenders are alike.
 #[derive(Debug)]
-pub(super) struct Relabellings {
-    orders: Vec<Vec<usize>>,
+pub(super) struct Kinds {
+    /// The first defender of the same kind, for every defender; the target is like nobody.
+    first: Vec<usize>,
+    /// Whether any two are alike.
+    some: bool,
 }
 
-impl Relabellings {
+/// Spreads the bits of a colour (the finisher of SplitMix64).
+fn mix(x: u64) -> u64 {
+    let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    x ^ (x >> 31)
+}
+
+impl Kinds {
     pub(super) fn of(game: &Game) -> Self {
         let w = game.weights();
         let same = |i: usize, j: usize| {
@@ -30,51 +43,57 @@ impl Relabellings {
                 .into_iter()
                 .all(|weights| weights.get(i).map(|x| x.to_bits()) == weights.get(j).map(|x| x.to_bits()))
         };
-        let n = game.n();
-        // Each player picks its equals among those before it: the product of all choices is the number of relabellings.
-        let count = (0..n).try_fold(1usize, |count, i| {
-            let count = count * (1 + (0..i).filter(|&j| same(i, j)).count());
-            (count <= MOST).then_some(count)
-        });
-        let mut orders = vec![Vec::new()];
-        for i in 0..game.size() {
-            let alone = i == n || count.is_none();
-            let choices = |taken: &Vec<usize>| -> Vec<Vec<usize>> {
-                (0..game.size())
-                    .filter(|&j| j == i || !alone && j < n && same(i, j))
-                    .filter(|j| !taken.contains(j))
-                    .map(|j| taken.iter().copied().chain([j]).collect())
-                    .collect()
-            };
-            orders = orders.iter().flat_map(choices).collect();
+        let first = |i: usize| if i == game.n() { i } else { (0..i).find(|&j| same(i, j)).unwrap_or(i) };
+        let first: Vec<usize> = (0..game.size()).map(first).collect();
+        let some = first.iter().enumerate().any(|(i, &first)| first != i);
+        Self { first, some }
+    }
+
+    /// Whether any two defenders are alike.
+    pub(super) fn some(&self) -> bool {
+        self.some
+    }
+
+    /// The model of a topology, and the order that leads to it.
+    pub(super) fn model(&self, topology: &Topology) -> (Topology, Vec<usize>) {
+        let size = topology.size();
+        let mut order: Vec<usize> = (0..size).collect();
+        if !self.some {
+            return (topology.clone(), order);
         }
-        Self { orders }
-    }
-
-    /// The one that changes nothing.
-    pub(super) fn none(&self) -> &[usize] {
-        &self.orders[0]
-    }
-
-    /// All relabellings but the one that changes nothing.
-    pub(super) fn others(&self) -> impl Iterator<Item = &[usize]> {
-        self.orders.iter().skip(1).map(Vec::as_slice)
-    }
-
-    /// The first topology among the relabelled ones, and the order that leads to it.
-    pub(super) fn first(&self, topology: &Topology) -> (Topology, &[usize]) {
-        let mut best = (topology.clone(), self.none());
-        for order in self.others() {
-            let other = topology.relabelled(order);
-            if other < best.0 {
-                best = (other, order);
+        let mut colours: Vec<u64> = self.first.iter().map(|&first| mix(first as u64 + 1)).collect();
+        for i in 0..topology.rows() {
+            colours[i] = mix(colours[i] ^ u64::from(topology.sees_attacker(i)));
+        }
+        for _ in 0..ROUNDS {
+            // Sums do not depend on the order in which neighbours come.
+            let mut next = colours.clone();
+            for i in 0..topology.rows() {
+                for j in (0..size).filter(|&j| j != i && topology.sees(i, j)) {
+                    next[i] = next[i].wrapping_add(mix(colours[j]));
+                    next[j] = next[j].wrapping_add(mix(!colours[i]));
+                }
             }
+            colours = next.into_iter().map(mix).collect();
         }
-        best
+        // The places of a kind go to its players, who sees most first: models that are alike are solved side by side, and
+        // lanes with the same unknowns waste none.
+        let sight = |i: usize| {
+            let seen = (0..size).filter(|&j| i < topology.rows() && topology.sees(i, j)).count();
+            std::cmp::Reverse((seen, topology.rows() > i && topology.sees_attacker(i)))
+        };
+        let mut players = order.clone();
+        players.sort_by_cached_key(|&i| (self.first[i], sight(i), colours[i]));
+        let mut places = order.clone();
+        places.sort_by_key(|&i| self.first[i]);
+        for (place, player) in places.into_iter().zip(players) {
+            order[place] = player;
+        }
+        (topology.relabelled(&order), order)
     }
 }
 
-/// The rows of a relabelled game, each as wide as `order` is long, under their own names.
+/// The rows of a model, each as wide as `order` is long, under their own names.
 pub(super) fn back(order: &[usize], rows: &[f64]) -> Vec<f64> {
     let n = order.len();
     let mut out = vec![0.0; rows.len()];
@@ -88,38 +107,54 @@ pub(super) fn back(order: &[usize], rows: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::game::{Interaction, bank};
 
-    fn orders(r_d: &[f64], q_ad: &[f64]) -> usize {
+    fn kinds(r_d: &[f64], q_ad: &[f64]) -> Vec<usize> {
         let base = bank::paper_game(Interaction::I2, 1.0).unwrap();
         let mut weights = base.weights().clone();
         weights.r_d = r_d.to_vec();
         weights.q_ad = q_ad.to_vec();
         weights.f_ad = vec![1.0; r_d.len()];
-        Relabellings::of(&Game::new(Interaction::I2, weights, *base.grid()).unwrap()).orders.len()
+        Kinds::of(&Game::new(Interaction::I2, weights, *base.grid()).unwrap()).first
     }
 
     #[test]
-    fn only_equal_defenders_change_places() {
-        assert_eq!(orders(&[1.0], &[1.0]), 1);
-        assert_eq!(orders(&[1.0; 3], &[1.0; 3]), 6);
-        assert_eq!(orders(&[1.0, 2.0, 1.0, 2.0], &[1.0; 4]), 4);
-        assert_eq!(orders(&[1.0, 2.0, 1.0, 2.0], &[1.0, 1.0, 1.0, 3.0]), 2);
-        assert_eq!(orders(&[1.0; 6], &[1.0; 6]), 720);
-        assert_eq!(orders(&[1.0; 7], &[1.0; 7]), 1);
+    fn defenders_of_equal_weights_are_alike() {
+        assert_eq!(kinds(&[1.0], &[1.0]), [0, 1]);
+        assert_eq!(kinds(&[1.0; 3], &[1.0; 3]), [0, 0, 0, 3]);
+        assert_eq!(kinds(&[1.0, 2.0, 1.0, 2.0], &[1.0; 4]), [0, 1, 0, 1, 4]);
+        assert_eq!(kinds(&[1.0, 2.0, 1.0, 2.0], &[1.0, 1.0, 1.0, 3.0]), [0, 1, 0, 3, 4]);
     }
 
+    /// All networks of three defenders, and many of four of two kinds: as many models as there are classes under all
+    /// relabellings, found by trying them. Where three see each other in a circle they have one colour, and the two
+    /// directions stay apart: with the attacker and the target seen or not, four classes have two models.
     #[test]
-    fn all_relabelled_networks_have_the_same_first() {
-        let all = Relabellings::of(&bank::paper_game(Interaction::I2, 1.0).unwrap());
-        for key in (0..1u64 << 16).step_by(37) {
-            let topology = Topology::from_key(4, 4, key);
-            let (first, order) = all.first(&topology);
-            assert_eq!(topology.relabelled(order), first);
-            for other in all.others() {
-                assert_eq!(all.first(&topology.relabelled(other)).0, first);
+    fn relabelled_networks_have_one_model() {
+        let cases: [(&[usize], usize, usize, &[&[usize]]); 2] = [
+            (
+                &[0, 0, 0, 3],
+                3,
+                4,
+                &[&[0, 1, 2, 3], &[0, 2, 1, 3], &[1, 0, 2, 3], &[1, 2, 0, 3], &[2, 0, 1, 3], &[2, 1, 0, 3]],
+            ),
+            (&[0, 1, 0, 1, 4], 5, 0, &[&[0, 1, 2, 3, 4], &[2, 1, 0, 3, 4], &[0, 3, 2, 1, 4], &[2, 3, 0, 1, 4]]),
+        ];
+        for (first, rows, circles, orders) in cases {
+            let (all, size) = (Kinds { first: first.to_vec(), some: true }, first.len());
+            let (mut models, mut classes) = (BTreeSet::new(), BTreeSet::new());
+            for key in (0..1u64 << (rows * size)).step_by(if size == 4 { 1 } else { 1471 }) {
+                let topology = Topology::from_key(rows, size, key);
+                let (model, order) = all.model(&topology);
+                assert_eq!(topology.relabelled(&order), model);
+                assert!(orders.contains(&order.as_slice()));
+                models.insert(model);
+                classes.insert(orders.iter().map(|order| topology.relabelled(order)).min());
             }
+            assert_eq!(models.len(), classes.len() + circles, "{first:?}");
         }
     }
 }

@@ -9,6 +9,7 @@ use super::Policy;
 use super::shelf::padded;
 use crate::error::TableError;
 use crate::game::{Game, Interaction};
+use crate::network::Topology;
 
 const MAGIC: &[u8; 8] = b"tadtable";
 const FORMAT: u32 = 1;
@@ -139,7 +140,11 @@ impl Policy {
             for column in matrix.chunks_exact_mut(rows) {
                 column[..size].iter_mut().for_each(|x| *x = f64::from_bits(reader.u64()));
             }
-            self.transitions.keep(step, &key, &matrix, &self.budget);
+            let model = self
+                .kinds
+                .some()
+                .then(|| self.kinds.model(&Topology::from_words(self.game.constrained(), size, &key)).0);
+            self.transitions.keep(step, &key, model.as_ref().map(Topology::words), &matrix, &self.budget);
         }
         Ok(self.transitions.entries.load(std::sync::atomic::Ordering::Relaxed))
     }

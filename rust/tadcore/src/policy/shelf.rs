@@ -40,10 +40,65 @@ pub(crate) enum Index {
     Wide(HashMap<Box<[u64]>, u32>),
 }
 
+impl Index {
+    /// An empty index for keys of `bits`, by the key itself where that is small.
+    fn new(bits: usize, direct: bool) -> Self {
+        match bits {
+            0..=DIRECT_BITS if direct => Self::Direct(Vec::new()),
+            0..=64 => Self::Hashed(OpenTable::default()),
+            _ => Self::Wide(HashMap::new()),
+        }
+    }
+
+    /// The slot of a key, 0 where there is none.
+    #[inline(always)]
+    fn find(&self, words: &[u64]) -> u32 {
+        match self {
+            Self::Direct(slots) => slots.get(words[0] as usize).map_or(0, |&slot| u32::from(slot)),
+            Self::Hashed(table) => table.find(words[0]),
+            Self::Wide(map) => map.get(words).copied().unwrap_or(0),
+        }
+    }
+
+    fn insert(&mut self, words: &[u64], slot: usize, bits: usize) {
+        match self {
+            Self::Direct(slots) => {
+                if slots.is_empty() {
+                    slots.resize(1 << bits, 0);
+                }
+                slots[words[0] as usize] = slot as u16;
+            }
+            Self::Hashed(table) => table.insert(words[0], slot as u32),
+            Self::Wide(map) => {
+                map.insert(words.into(), slot as u32);
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        match self {
+            Self::Direct(slots) => slots.fill(0),
+            Self::Hashed(table) => table.clear(),
+            Self::Wide(map) => map.clear(),
+        }
+    }
+
+    /// Bytes that one more key takes, the table's own memory with the first.
+    fn entry_bytes(&self, bits: usize) -> usize {
+        match self {
+            Self::Direct(slots) if slots.is_empty() => size_of::<u16>() << bits,
+            Self::Direct(_) => 0,
+            Self::Hashed(_) => 4 * size_of::<(u64, u32)>(),
+            Self::Wide(_) => 2 * (size_of::<(Box<[u64]>, u32)>() + 8 * bits.div_ceil(64)),
+        }
+    }
+}
+
 /// Open addressing with linear probing, at most half full; slot 0 marks a free place.
 #[derive(Debug, Default)]
 pub(crate) struct OpenTable {
     places: Vec<(u64, u32)>,
+    held: usize,
     shift: u32,
 }
 
@@ -71,7 +126,8 @@ impl OpenTable {
     }
 
     fn insert(&mut self, key: u64, slot: u32) {
-        if 2 * (slot as usize + 1) > self.places.len() {
+        self.held += 1;
+        if 2 * (self.held + 1) > self.places.len() {
             let size = (2 * self.places.len()).max(16);
             let old = std::mem::replace(&mut self.places, vec![(0, 0); size]);
             self.shift = 64 - size.trailing_zeros();
@@ -80,6 +136,11 @@ impl OpenTable {
             }
         }
         self.place(key, slot);
+    }
+
+    fn clear(&mut self) {
+        self.places.fill((0, 0));
+        self.held = 0;
     }
 
     fn place(&mut self, key: u64, slot: u32) {
@@ -96,6 +157,8 @@ impl OpenTable {
 #[derive(Debug)]
 pub(crate) struct Shelf {
     index: Index,
+    /// By model: the slot of the first topology that was derived from it.
+    models: Index,
     matrices: Vec<f64>,
     keys: Vec<u64>,
     bits: usize,
@@ -108,22 +171,19 @@ impl Shelf {
     /// An empty shelf for N = `size` and `rows` constrained players.
     pub(crate) fn new(rows: usize, size: usize) -> Self {
         let bits = rows * size;
-        let index = match bits {
-            0..=DIRECT_BITS => Index::Direct(Vec::new()),
-            13..=64 => Index::Hashed(OpenTable::default()),
-            _ => Index::Wide(HashMap::new()),
-        };
-        Self { index, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size), skip: 0 }
+        let (index, models) = (Index::new(bits, true), Index::new(bits, false));
+        Self { index, models, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size), skip: 0 }
     }
 
     /// The slot of a topology's entry, 0 where there is none.
     #[inline(always)]
     pub(crate) fn find(&self, words: &[u64]) -> u32 {
-        match &self.index {
-            Index::Direct(slots) => slots.get(words[0] as usize).map_or(0, |&slot| u32::from(slot)),
-            Index::Hashed(table) => table.find(words[0]),
-            Index::Wide(map) => map.get(words).copied().unwrap_or(0),
-        }
+        self.index.find(words)
+    }
+
+    /// The slot of a topology with this model, 0 where there is none.
+    pub(crate) fn find_model(&self, words: &[u64]) -> u32 {
+        self.models.find(words)
     }
 
     /// The slots by key of a shelf with at most [`DIRECT_BITS`] bits, for sweeps that know their size.
@@ -166,31 +226,27 @@ impl Shelf {
         self.keys.chunks_exact(self.bits.div_ceil(64))
     }
 
+    /// The key in a slot.
+    pub(crate) fn key(&self, slot: usize) -> &[u64] {
+        let words = self.bits.div_ceil(64);
+        &self.keys[(slot - 1) * words..][..words]
+    }
+
     /// The matrix in a slot.
     pub(crate) fn matrix(&self, slot: usize) -> &[f64] {
         &self.matrices()[slot * self.stride..][..self.stride]
     }
 
-    /// Bytes that one more entry takes, the shelf's own memory with the first.
-    pub(crate) fn entry_bytes(&self) -> usize {
+    /// Bytes that one more entry takes, the shelf's own memory with the first; `shared` if it may have a model.
+    pub(crate) fn entry_bytes(&self, shared: bool) -> usize {
         let words = self.bits.div_ceil(64);
-        let lookup = match &self.index {
-            Index::Direct(slots) => {
-                if slots.is_empty() {
-                    size_of::<u16>() << self.bits
-                } else {
-                    0
-                }
-            }
-            Index::Hashed(_) => 4 * size_of::<(u64, u32)>(),
-            Index::Wide(_) => 2 * (size_of::<(Box<[u64]>, u32)>() + 8 * words),
-        };
+        let models = if shared { self.models.entry_bytes(self.bits) } else { 0 };
         // A vector that grows by doubling is up to half empty.
-        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words) + lookup
+        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words) + self.index.entry_bytes(self.bits) + models
     }
 
-    /// Adds an entry that is not there yet.
-    pub(crate) fn insert(&mut self, words: &[u64], matrix: &[f64]) {
+    /// Adds an entry that is not there yet, and its model if it may have one.
+    pub(crate) fn insert(&mut self, words: &[u64], model: Option<&[u64]>, matrix: &[f64]) {
         debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
         if self.matrices.capacity() < self.matrices.len() + self.stride {
             self.grow();
@@ -198,17 +254,9 @@ impl Shelf {
         let slot = self.matrices().len() / self.stride;
         self.matrices.extend_from_slice(matrix);
         self.keys.extend_from_slice(words);
-        match &mut self.index {
-            Index::Direct(slots) => {
-                if slots.is_empty() {
-                    slots.resize(1 << self.bits, 0);
-                }
-                slots[words[0] as usize] = slot as u16;
-            }
-            Index::Hashed(table) => table.insert(words[0], slot as u32),
-            Index::Wide(map) => {
-                map.insert(words.into(), slot as u32);
-            }
+        self.index.insert(words, slot, self.bits);
+        if let Some(model) = model.filter(|model| self.models.find(model) == 0) {
+            self.models.insert(model, slot, self.bits);
         }
     }
 
@@ -228,11 +276,8 @@ impl Shelf {
     pub(crate) fn clear(&mut self) {
         self.matrices.truncate(self.skip + self.stride);
         self.keys.clear();
-        match &mut self.index {
-            Index::Direct(slots) => slots.fill(0),
-            Index::Hashed(table) => table.places.fill((0, 0)),
-            Index::Wide(map) => map.clear(),
-        }
+        self.index.clear();
+        self.models.clear();
     }
 }
 
@@ -257,18 +302,21 @@ mod tests {
             };
             for i in 0..3000 {
                 assert_eq!(shelf.find(&key(i)), 0, "{rows} {size} {i}");
-                shelf.insert(&key(i), &vec![i as f64; stride]);
+                shelf.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]);
             }
             assert_eq!(shelf.len(), 3000);
             for i in 0..3000 {
                 let slot = shelf.find(&key(i)) as usize;
                 assert_eq!(slot, i as usize + 1);
                 assert!(shelf.matrix(slot).iter().all(|&x| x == i as f64));
+                assert_eq!(shelf.key(slot), key(i));
+                // Two entries each have the first as their model.
+                assert_eq!(shelf.find_model(&key(i)), if i % 2 == 0 { i as u32 + 1 } else { 0 });
             }
             assert_eq!(shelf.matrices().as_ptr().align_offset(LINE), 0);
             assert_eq!(shelf.find(&key(3000)), 0);
             shelf.clear();
-            assert_eq!((shelf.find(&key(5)), shelf.len()), (0, 0));
+            assert_eq!((shelf.find(&key(5)), shelf.find_model(&key(4)), shelf.len()), (0, 0, 0));
         }
     }
 }

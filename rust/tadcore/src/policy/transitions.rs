@@ -111,14 +111,21 @@ impl Transitions {
     }
 
     /// Adds an entry unless it is there or the budget is used up; says whether it is there now.
-    pub(super) fn keep(&self, step: usize, words: &[u64], matrix: &[f64], budget: &Budget) -> bool {
+    pub(super) fn keep(
+        &self,
+        step: usize,
+        words: &[u64],
+        model: Option<&[u64]>,
+        matrix: &[f64],
+        budget: &Budget,
+    ) -> bool {
         let mut shelf = self.shelves[step].write().unwrap_or_else(PoisonError::into_inner);
         if shelf.find(words) != 0 {
             return true;
         }
-        let kept = budget.take(shelf.entry_bytes());
+        let kept = budget.take(shelf.entry_bytes(model.is_some()));
         if kept {
-            shelf.insert(words, matrix);
+            shelf.insert(words, model, matrix);
             self.entries.fetch_add(1, Ordering::Relaxed);
         }
         kept
@@ -133,18 +140,11 @@ struct Instant {
     solved: u64,
 }
 
-/// An entry that nobody has, and the one that is solved for it.
-struct Unknown<'a> {
+/// A topology that is wanted, its model, and the order that leads there.
+struct Wanted<'a> {
     topology: &'a Topology,
-    first: Topology,
-    order: &'a [usize],
-}
-
-impl<'a> Unknown<'a> {
-    fn new(policy: &'a Policy, topology: &'a Topology) -> Self {
-        let (first, order) = policy.relabellings.first(topology);
-        Self { topology, first, order }
-    }
+    model: Topology,
+    order: Vec<usize>,
 }
 
 /// What a thread needs to solve entries.
@@ -169,84 +169,88 @@ impl Policy {
         cancel: &CancelToken,
     ) -> Result<u64, Cancelled> {
         let claims = &self.transitions.claims[step];
-        let unknown = missing.iter().filter(|topology| !self.supply(step, topology, local, &mut filler.padded));
-        let mut unknown: Vec<Unknown> = unknown.map(|topology| Unknown::new(self, topology)).collect();
+        let wanted: Vec<Wanted> = missing
+            .iter()
+            .map(|topology| {
+                let (model, order) = self.kinds.model(topology);
+                Wanted { topology, model, order }
+            })
+            .collect();
+        let mut unknown: Vec<&Wanted> =
+            wanted.iter().filter(|wanted| !self.supply(step, wanted, local, &mut filler.padded)).collect();
         // Those with many unknowns first: the quick ones fill the lanes to the end.
-        unknown.sort_by(|a, b| (b.first.edges(), &b.first).cmp(&(a.first.edges(), &a.first)));
-        unknown.dedup_by(|a, b| a.first == b.first);
+        unknown.sort_by(|a, b| (b.model.edges(), &b.model).cmp(&(a.model.edges(), &a.model)));
+        unknown.dedup_by(|a, b| a.model == b.model);
         let group = if self.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
         let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
         let mut instant = Instant { problem: self.problem(step), free: self.free_rows(step), step, solved: 0 };
         for group in unknown.chunks(group) {
             cancel.check()?;
-            let claimed: Vec<(Claim, &Unknown)> =
-                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.first)?, wanted))).collect();
-            let mut mine: Vec<&Unknown> = claimed.iter().map(|&(_, wanted)| wanted).collect();
-            mine.retain(|wanted| !self.supply(step, wanted.topology, local, &mut filler.padded));
+            let claimed: Vec<(Claim, &Wanted)> =
+                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.model)?, *wanted))).collect();
+            let mut mine: Vec<&Wanted> = claimed.iter().map(|&(_, wanted)| wanted).collect();
+            mine.retain(|wanted| !self.supply(step, wanted, local, &mut filler.padded));
             self.solve_group(&mut instant, &mine, local, filler);
         }
         for wanted in &unknown {
-            claims.wait(&wanted.first, cancel)?;
+            claims.wait(&wanted.model, cancel)?;
         }
-        for topology in missing {
+        for wanted in &wanted {
             // Past the budget, or left by a thread that was cancelled.
-            if !self.supply(step, topology, local, &mut filler.padded) {
-                self.solve_group(&mut instant, &[&Unknown::new(self, topology)], local, filler);
+            if !self.supply(step, wanted, local, &mut filler.padded) {
+                self.solve_group(&mut instant, &[wanted], local, filler);
             }
         }
         Ok(instant.solved)
     }
 
     /// Makes an entry available that is there already, under its own name or another; says whether it is.
-    fn supply(&self, step: usize, topology: &Topology, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
+    fn supply(&self, step: usize, wanted: &Wanted, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
         let shelf = self.transitions.shelf(step);
-        let lookup = |local: &Shelf, words: &[u64]| match (shelf.find(words), local.find(words)) {
-            (0, 0) => None,
-            (0, slot) => Some((true, slot as usize)),
-            (slot, _) => Some((false, slot as usize)),
-        };
-        if lookup(local, topology.words()).is_some() {
+        let words = wanted.topology.words();
+        if shelf.find(words) != 0 || local.find(words) != 0 {
             return true;
         }
-        let mut others = self.relabellings.others().map(|order| topology.relabelled(order));
-        let Some((other, mine, slot)) = others.find_map(|other| {
-            let (mine, slot) = lookup(local, other.words())?;
-            Some((other, mine, slot))
-        }) else {
-            return false;
+        let model = wanted.model.words();
+        let (held, slot) = match (shelf.find_model(model), local.find_model(model)) {
+            (0, 0) => return false,
+            (0, slot) => (&*local, slot as usize),
+            (slot, _) => (&*shelf, slot as usize),
         };
-        let from = if mine { local.matrix(slot) } else { shelf.matrix(slot) };
-        let (to, of) = (self.relabellings.first(topology).1, self.relabellings.first(&other).1);
-        let rows = padded(self.game.size());
+        let other = Topology::from_words(self.game.constrained(), self.game.size(), held.key(slot));
+        let (from, rows) = (held.matrix(slot), padded(self.game.size()));
+        let of = self.kinds.model(&other).1;
         matrix.clear();
         matrix.resize(from.len(), 0.0);
-        for (&j, &other_j) in to.iter().zip(of) {
-            for (&i, &other_i) in to.iter().zip(of) {
+        for (&j, &other_j) in wanted.order.iter().zip(&of) {
+            for (&i, &other_i) in wanted.order.iter().zip(&of) {
                 matrix[j * rows + i] = from[other_j * rows + other_i];
             }
         }
         drop(shelf);
-        self.store(step, topology, local, matrix);
+        self.store(step, wanted.topology, &wanted.model, local, matrix);
         true
     }
 
     /// Stores an entry in the table or, where the budget is used up, in `local`.
-    fn store(&self, step: usize, topology: &Topology, local: &mut Shelf, matrix: &[f64]) {
-        if !self.transitions.keep(step, topology.words(), matrix, &self.budget) {
-            local.insert(topology.words(), matrix);
+    fn store(&self, step: usize, topology: &Topology, model: &Topology, local: &mut Shelf, matrix: &[f64]) {
+        let model = self.kinds.some().then_some(model.words());
+        if !self.transitions.keep(step, topology.words(), model, matrix, &self.budget) {
+            local.insert(topology.words(), model, matrix);
         }
     }
 
     /// Solves entries of one instant together and stores them.
-    fn solve_group(&self, instant: &mut Instant, wanted: &[&Unknown], local: &mut Shelf, filler: &mut Filler) {
+    fn solve_group(&self, instant: &mut Instant, wanted: &[&Wanted], local: &mut Shelf, filler: &mut Filler) {
         let (n, step) = (self.game.size(), instant.step);
         instant.solved += wanted.len() as u64;
         let mut unknown = Vec::new();
         for &wanted in wanted {
             match self.table.peek(step, wanted.topology) {
                 Some(known) => {
-                    pad(&known.transition, self.relabellings.none(), &mut filler.padded);
-                    self.store(step, wanted.topology, local, &filler.padded);
+                    let none: Vec<usize> = (0..n).collect();
+                    pad(&known.transition, &none, &mut filler.padded);
+                    self.store(step, wanted.topology, &wanted.model, local, &filler.padded);
                 }
                 None => unknown.push(wanted),
             }
@@ -255,12 +259,13 @@ impl Policy {
         filler.closed_loop.resize(n * n, 0.0);
         filler.row.resize(n, 0.0);
         let Filler { solver, closed_loop, square, row, padded } = filler;
-        let firsts: Vec<Topology> = unknown.iter().map(|wanted| wanted.first.clone()).collect();
-        solver.solve_all(&instant.problem, &firsts, crate::synthesis::Options::default(), |index, gains| {
+        let models: Vec<Topology> = unknown.iter().map(|wanted| wanted.model.clone()).collect();
+        solver.solve_all(&instant.problem, &models, crate::synthesis::Options::default(), |index, gains| {
             super::closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
             super::exponential::exponential(closed_loop, &instant.free.attacker, self.game.grid().step(), square, row);
-            pad(square, unknown[index].order, padded);
-            self.store(step, unknown[index].topology, local, padded);
+            let Wanted { topology, model, order } = unknown[index];
+            pad(square, order, padded);
+            self.store(step, topology, model, local, padded);
         });
     }
 }
