@@ -40,20 +40,18 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
 #[test]
 fn the_look_that_won_is_the_one_that_leads_there() {
     let mut won = [0, 0];
-    for interaction in [Interaction::I1, Interaction::I2] {
-        let (problem, _, _) = sample(interaction);
-        let (m, n) = (problem.rows(), problem.size());
-        for key in 0..1u64 << (m * n) {
-            let topology = Topology::from_key(m, n, key);
-            let found = Synthesizer::new().solve(&problem, &topology, Options::default());
-            let reaches = |complex| alone(&problem, &topology, complex) <= found.theta * (1.0 + 1e-8);
-            match found.look {
-                Look::Complex => assert!(reaches(true), "{topology:?}"),
-                Look::Stacked => assert!(reaches(false) && !reaches(true), "{topology:?}"),
-                Look::Canonical | Look::Reversed => continue,
-            }
-            won[usize::from(found.look == Look::Stacked)] += 1;
+    let (problem, _, _) = sample(Interaction::I2);
+    let (m, n) = (problem.rows(), problem.size());
+    for key in 0..1u64 << (m * n) {
+        let topology = Topology::from_key(m, n, key);
+        let found = Synthesizer::new().solve(&problem, &topology, Options::default());
+        let reaches = |complex| alone(&problem, &topology, complex) <= found.theta * (1.0 + 1e-8);
+        match found.look {
+            Look::Complex => assert!(reaches(true), "{topology:?}"),
+            Look::Stacked => assert!(reaches(false) && !reaches(true), "{topology:?}"),
+            Look::Canonical | Look::Reversed => continue,
         }
+        won[usize::from(found.look == Look::Stacked)] += 1;
     }
-    assert!(won[0] >= 5 && won[1] >= 5, "{won:?}");
+    assert!(won[0] >= 10 && won[1] >= 3, "{won:?}");
 }
