@@ -2,10 +2,13 @@
 
     python tests/mutants [--only WORD …]
 
-Copies the sources and, room by room, writes its mutants of `listed.py` beside the original behind a switch, builds the
-tests and runs them once per mutant, the quick ones first, up to the first failure. Prints a table: file, formula, the
-test that failed. Leaves with 1 if a mutant survives and `listed.py` does not say why, or if the tests fail without any
-mutant.
+Copies the sources and, room by room, writes its mutants of `listed.py` beside the original behind a switch. The
+programs of the Rust tests run once per mutant, the quick ones first, up to the first failure; one is built when the
+first mutant gets to it. Prints a table: file, formula, the test that failed. Leaves with 1 if a mutant survives and
+`listed.py` does not say why, or if the tests fail without any mutant.
+
+The build is lighter than a release: little is optimised, and in the rooms of `LIGHTER` the only size with constant loop
+bounds is N = 3, all others going through the version for any size. The formulas are the same lines of generic code.
 """
 
 import argparse
@@ -16,6 +19,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,22 +27,41 @@ from listed import EQUIVALENT, MUTANTS
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path("rust/tadcore/src")
-# In this order, but for the equations their own tests before the runs. Properties draw games from a fixed seed.
-TESTS = ["tadcore", "synthesis", "paper", "ensemble", "properties", "riccati"]
+# In this order, but for a room's own tests, in the library and beside it, which are first. Properties draw games from a
+# fixed seed.
+TESTS = ["synthesis", "looks", "tadcore", "paper", "ensemble", "properties", "riccati"]
 ENVIRONMENT = {"PROPTEST_CASES": "24", "PROPTEST_RNG_SEED": "20250117"}
 # Seconds of the processor after which a test program hangs, as a multiple of its time without a mutant and at least; a
 # busy machine changes nothing in them. On the clock, for what sleeps for ever, so many times as long.
-PATIENCE, LEAST, CLOCK = 10.0, 20.0, 20.0
+PATIENCE, LEAST, CLOCK = 6.0, 6.0, 20.0
+# What a room is built without: by file, lines of the source that match, and what stands there instead.
+SIZES = {
+    "synthesis/mod.rs": (r"^ +([245678]) => self\.solve_sized::<\1>.*\n", ""),
+    "ensemble/sweep.rs": (r"^ +2 1 1; .*\n", "3 2 1; 3 3 1;\n"),
+}
+LIGHTER = {"synthesis": SIZES, "lanes": SIZES}
+# The number is read before `main`, so that a choice in an inner loop is a comparison and no more.
 SWITCH = """
 #[doc(hidden)]
-pub static MUTANT: std::sync::LazyLock<usize> =
-    std::sync::LazyLock::new(|| std::env::var("TADCORE_MUTANT").ok().and_then(|v| v.parse().ok()).unwrap_or(0));
+pub static mut MUTANT: usize = 0;
+
+extern "C" fn choose() {
+    let number = std::env::var("TADCORE_MUTANT").ok().and_then(|v| v.parse().ok()).unwrap_or(0);
+    // SAFETY: there is one thread yet.
+    unsafe { MUTANT = number };
+}
+
+#[used]
+#[cfg_attr(target_os = "macos", unsafe(link_section = "__DATA,__mod_init_func"))]
+#[cfg_attr(not(target_os = "macos"), unsafe(link_section = ".init_array"))]
+static CHOOSE: extern "C" fn() = choose;
 
 /// Whether the mutant of this number is to be run.
 #[doc(hidden)]
 #[inline(always)]
 pub fn mutant(number: usize) -> bool {
-    *MUTANT == number
+    // SAFETY: written before `main` alone.
+    unsafe { MUTANT == number }
 }
 """
 
@@ -80,17 +103,23 @@ def planted(file, text, mutants):
     return text
 
 
-def copy(tree, mutants):
+def copy(tree, mutants, lighter):
     """Makes `tree` the workspace with the mutants; a file that is as it was keeps its time and is not built again."""
-    paths = [path for folder in ["rust", "tests/rust", "benches"] for path in (ROOT / folder).rglob("*")]
-    wanted = {path.relative_to(ROOT) for path in paths if path.suffix in {".rs", ".toml", ".html"}}
+    folders = ["rust", "tests/rust", "tests/reference", "benches"]
+    paths = [path for folder in folders for path in (ROOT / folder).rglob("*")]
+    wanted = {path.relative_to(ROOT) for path in paths if path.suffix in {".rs", ".toml", ".html", ".json"}}
     wanted |= {Path("Cargo.toml"), Path("Cargo.lock"), Path("README.md")}
     for old in [path for path in tree.rglob("*") if path.is_file() and path.relative_to(tree) not in wanted]:
         old.unlink()
     for path in wanted:
         text = (ROOT / path).read_text()
         if path.is_relative_to(CORE):
-            text = planted(path.relative_to(CORE).as_posix(), text, mutants)
+            own = path.relative_to(CORE).as_posix()
+            if own in lighter:
+                text, count = re.subn(*lighter[own], text, flags=re.M)
+                if not count:
+                    sys.exit(f"{own}: nothing to leave out")
+            text = planted(own, text, mutants)
             text += SWITCH if path == CORE / "lib.rs" else ""
         copied = tree / path
         if not copied.exists() or copied.read_text() != text:
@@ -98,11 +127,11 @@ def copy(tree, mutants):
             copied.write_text(text)
 
 
-def build(tree, target):
-    """The test programs by name."""
-    command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", "tadcore", "--lib", "--tests", "--no-run"]
+def build(tree, target, name):
+    """The program of the tests of this name."""
+    command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", "tadcore", "--no-run"]
     out = subprocess.run(
-        [*command, "--message-format=json-render-diagnostics"],
+        [*command, *(["--lib"] if name == "tadcore" else ["--test", name]), "--message-format=json-render-diagnostics"],
         cwd=tree,
         env={**os.environ, "CARGO_TARGET_DIR": str(target)},
         capture_output=True,
@@ -112,44 +141,70 @@ def build(tree, target):
         sys.exit(f"{out.stderr}\nthe mutants do not compile")
     messages = [json.loads(line) for line in out.stdout.splitlines()]
     made = [m for m in messages if m.get("executable") and m["reason"] == "compiler-artifact"]
-    return {m["target"]["name"]: Path(m["executable"]) for m in made}
+    return next(Path(m["executable"]) for m in made if m["target"]["name"] == name)
 
 
-def run(program, tree, number, limit):
-    """The tests that fail under a mutant, and the seconds of the processor that the program took."""
+def run(program, words, tree, number, limit):
+    """The first test to fail under a mutant, of those whose names contain a word of `words`; processor's seconds."""
     environment = {**os.environ, **ENVIRONMENT, "TADCORE_MUTANT": str(number)}
     began = resource.getrusage(resource.RUSAGE_CHILDREN)
-    try:
-        out = subprocess.run(
-            [program, "--test-threads=1"],
-            cwd=tree / "rust/tadcore",
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            timeout=limit and CLOCK * limit,
-            preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))),
-        )
-    except subprocess.TimeoutExpired:
-        return ["no end"], limit
+    with subprocess.Popen(
+        [program, *words, "--test-threads=1"],
+        cwd=tree / "rust/tadcore",
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))),
+    ) as process:
+        asleep = threading.Timer(CLOCK * limit if limit else 1e6, process.kill)
+        asleep.daemon = True
+        asleep.start()
+        failed = None
+        for line in process.stdout:
+            if found := re.match(r"test (\S+)(?: - should panic)? \.\.\. FAILED", line):
+                failed = found[1]
+                process.kill()
+        code = process.wait()
+        asleep.cancel()
+    if code and not failed:
+        failed = "no end" if code in (-signal.SIGXCPU, -signal.SIGKILL) else f"exit {code}"
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-    failed = re.findall(r"^test (\S+) \.\.\. FAILED", out.stdout, re.M)
-    if out.returncode and not failed:
-        failed = ["no end" if out.returncode == -signal.SIGXCPU else f"exit {out.returncode}"]
     return failed, ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
 
 
-def verdict(found, tests, programs, tree, limits):
+class Programs:
+    """The test programs of a room, each built and timed without a mutant when first asked for."""
+
+    def __init__(self, tree, target, room):
+        self.tree, self.target = tree, target
+        own = [("tadcore", f"{room}::")] + [(name, "") for name in TESTS if name == room]
+        self.order = own + [(name, "") for name in TESTS if name != room]
+        self.built, self.limits = {}, {}
+
+    def first_failure(self, number):
+        for name, word in self.order:
+            if name not in self.built:
+                self.built[name] = build(self.tree, self.target, name)
+            words = [word] if word else []
+            if (name, word) not in self.limits:
+                failed, seconds = run(self.built[name], words, self.tree, 0, None)
+                if failed:
+                    sys.exit(f"without a mutant, {name}: {failed}")
+                self.limits[name, word] = max(LEAST, PATIENCE * seconds)
+            failed, _ = run(self.built[name], words, self.tree, number, self.limits[name, word])
+            if failed:
+                return f"{name}: {failed}"
+        return None
+
+
+def verdict(found, programs):
     """What a mutant's table row says, and whether that is as it should be."""
     number, file, formula, *_ = found
-    for name in sorted(tests, key=lambda name: name not in ("tadcore", file.split("/")[0])):
-        failed, _ = run(programs[name], tree, number, limits[name])
-        if failed:
-            break
+    failed = programs.first_failure(number)
     reason = EQUIVALENT.get((file, formula))
     if failed:
-        more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
-        said = f"{name}: {failed[0]}{more}" + ("  (but said to be equivalent)" if reason else "")
+        said = failed + ("  (but said to be equivalent)" if reason else "")
     else:
         said = f"survived: {reason}" if reason else "SURVIVED"
     print(f"{file:26} {formula:42} {said}", flush=True)
@@ -169,18 +224,12 @@ def main():
     print(f"{'file':26} {'formula':42} caught by", flush=True)
     caught, unexplained = 0, 0
     # A room at a time: where every loop holds a choice the tests are slow, and so is the compiler.
-    for chosen in rooms.values():
-        copy(tree, chosen)
-        programs = build(tree, target)
-        tests = [name for name in TESTS if name in programs]
-        limits = {}
-        for name in tests:
-            failed, seconds = run(programs[name], tree, 0, None)
-            if failed:
-                sys.exit(f"without a mutant, {name}: {', '.join(failed)}")
-            limits[name] = max(LEAST, PATIENCE * seconds)
-        for mutant in chosen:
-            failed, expected = verdict(mutant, tests, programs, tree, limits)
+    for room, chosen in rooms.items():
+        copy(tree, chosen, LIGHTER.get(room, {}))
+        programs = Programs(tree, target, room)
+        # Those that are said to survive go last: they need every program.
+        for mutant in sorted(chosen, key=lambda mutant: mutant[1:3] in EQUIVALENT):
+            failed, expected = verdict(mutant, programs)
             caught, unexplained = caught + failed, unexplained + (not expected)
     total = sum(map(len, rooms.values()))
     print(f"{total} mutants: {caught} caught, {total - caught} survived, {unexplained} unexplained")

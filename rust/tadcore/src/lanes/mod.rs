@@ -172,3 +172,6 @@ impl Number for f64 {
         Some(numbers)
     }
 }
+
+#[cfg(test)]
+mod tests;

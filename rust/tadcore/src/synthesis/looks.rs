@@ -299,3 +299,6 @@ fn far_start(entry: &Entry, scale: f64, out: &mut [f64]) {
     let pattern: Vec<f64> = (0..unknowns).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()).collect();
     start::advance(b, &entry.variables, &pattern);
 }
+
+#[cfg(test)]
+mod tests;

@@ -9,6 +9,8 @@ use super::*;
 use crate::game::Interaction;
 use crate::width::Width;
 
+mod descents;
+
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
     let width = objective.width();
     let h = 1e-5;
@@ -77,7 +79,7 @@ fn restrict(
     layout.restrict_form(objective, g, &mut vec![0.0; objective.width()], out);
 }
 
-fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {
+pub(super) fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {
     let (size, groups) = if interaction == Interaction::I1 { (4, 3) } else { (3, 1) };
     let mut seed = 0.3f64;
     let mut next = || {

@@ -1,0 +1,90 @@
+//! Each operation, lane by lane, against the same one on numbers by themselves.
+
+use super::*;
+use crate::width::Width;
+
+/// Pairs of them are in any order, equal, of both signs, zero, and no numbers.
+const NUMBERS: [f64; 11] = [0.0, -0.0, 1.0, -1.0, 1.5, -2.75, 0.1, 3e200, -7e-200, f64::INFINITY, f64::NAN];
+
+fn same(found: f64, expected: f64) -> bool {
+    found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan()
+}
+
+/// Another number in each lane.
+fn filled<T: Number>(from: usize, step: usize) -> T {
+    let mut number = T::splat(NUMBERS[0]);
+    for lane in 0..T::LANES {
+        number.set_lane(lane, NUMBERS[(from + lane * step) % NUMBERS.len()]);
+    }
+    number
+}
+
+fn check<T: Number>() {
+    for from in 0..NUMBERS.len() {
+        for step in 1..NUMBERS.len() {
+            let (a, x, y): (T, T, T) = (filled(from, 1), filled(2 * from, step), filled(from + step, step));
+            let (less, at_most) = (T::bits(x.less(y)), T::bits(x.at_most(y)));
+            let mask = (from * NUMBERS.len() + step) as u8;
+            let chosen = T::select(T::mask(mask), x, y);
+            let all = if T::LANES == 8 { u8::MAX } else { (1 << T::LANES) - 1 };
+            assert_eq!(T::bits(T::mask(mask)) & all, mask & all);
+            assert_eq!((less | at_most) & !all, 0);
+            for lane in 0..T::LANES {
+                let (p, u, v) = (a.lane(lane), x.lane(lane), y.lane(lane));
+                assert!(same(u, NUMBERS[(2 * from + lane * step) % NUMBERS.len()]));
+                assert!(same((x + y).lane(lane), u + v) && same((x - y).lane(lane), u - v));
+                assert!(same((x * y).lane(lane), u * v) && same((x / y).lane(lane), u / v));
+                assert!(same(a.plus(x, y).lane(lane), f64::mul_add(u, v, p)));
+                assert!(same(a.minus(x, y).lane(lane), f64::mul_add(-u, v, p)));
+                assert!(same(x.sqrt().lane(lane), f64::sqrt(u)) && same(x.abs().lane(lane), f64::abs(u)));
+                assert_eq!((less >> lane & 1 == 1, at_most >> lane & 1 == 1), (u < v, u <= v), "{u} {v}");
+                assert!(same(x.or_larger(y).lane(lane), if u < v { v } else { u }), "{u} {v}");
+                assert!(same(chosen.lane(lane), if mask >> lane & 1 == 1 { u } else { v }));
+            }
+        }
+    }
+    // Small integers: sums are exact in any order.
+    for len in 0..11 {
+        let numbers = |factor: usize| -> Vec<T> {
+            let lane = |i: usize, lane: usize| ((factor * i + lane) % 7) as f64 - 3.0;
+            (0..len)
+                .map(|i| {
+                    let mut number = T::splat(0.0);
+                    (0..T::LANES).for_each(|l| number.set_lane(l, lane(i, l)));
+                    number
+                })
+                .collect()
+        };
+        let (x, mut y) = (numbers(2), numbers(3));
+        for lane in 0..T::LANES {
+            let expected: f64 = x.iter().zip(&y).map(|(x, y)| x.lane(lane) * y.lane(lane)).sum();
+            assert_eq!((dot(&x, &y).lane(lane), dot_in_order(&x, &y).lane(lane)), (expected, expected));
+            let squares: f64 = x.iter().map(|x| x.lane(lane) * x.lane(lane)).sum();
+            assert_eq!(norm(&x).lane(lane), squares.sqrt());
+        }
+        let before = y.clone();
+        take(T::mask(0b0101_0010), &x, &mut y);
+        for ((y, x), before) in y.iter().zip(&x).zip(&before) {
+            for lane in 0..T::LANES {
+                let from = if 0b0101_0010 >> lane & 1 == 1 { x } else { before };
+                assert_eq!(y.lane(lane), from.lane(lane));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lane_does_what_a_number_alone_does() {
+    check::<f64>();
+    #[cfg(target_arch = "x86_64")]
+    for width in Width::all() {
+        match width {
+            Width::Baseline => {}
+            Width::Avx2 => check::<Wide>(),
+            Width::Avx512 => {
+                check::<Four>();
+                check::<Eight>();
+            }
+        }
+    }
+}

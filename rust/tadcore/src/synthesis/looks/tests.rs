@@ -1,0 +1,57 @@
+//! The look that is said to have won, against descents in its kind of gains alone.
+
+use super::*;
+use crate::game::Interaction;
+use crate::network::Topology;
+use crate::synthesis::tests::sample;
+use crate::synthesis::{Options, Synthesizer};
+
+/// The lowest Θ that descents in complex gains, or in stacked ones, lead to from the far start.
+fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
+    let (engine, tasks) = (&mut Engine::default(), &mut Tasks::default());
+    let mut canonical = vec![0.0; problem.rows * problem.size];
+    start::canonical(problem, topology, &mut canonical);
+    let entry = Entry::new(start::variables(topology), canonical);
+    let owners = [Owner { variables: &entry.variables, rival: None }];
+    let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
+    let scale = problem.scale.fne;
+    tasks.clear(entry.start.len(), 1);
+    tasks.add(0, false, 0.0).copy_from_slice(&entry.start);
+    engine.run::<0>(Kind::Real, problem, tasks, &owners, fine);
+    let relative_to = tasks.reached(0).scale;
+
+    tasks.clear(entry.start.len(), 2);
+    far_start(&entry, scale, tasks.add(0, complex, relative_to));
+    let coarse =
+        Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale };
+    engine.run::<0>(Kind::Doubled, problem, tasks, &owners, coarse);
+    let doubled = tasks.point(0).to_vec();
+    tasks.clear(entry.start.len(), 1);
+    let (a, b) = doubled.split_at(entry.start.len());
+    for sign in [0.0, 1.0, -1.0] {
+        for (x, (a, b)) in tasks.add(0, false, 0.0).iter_mut().zip(a.iter().zip(b)) {
+            *x = a + sign * b;
+        }
+    }
+    engine.run::<0>(Kind::Real, problem, tasks, &owners, fine);
+    (0..3).map(|task| tasks.reached(task).value).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn the_look_that_won_is_the_one_that_leads_there() {
+    let mut won = [0, 0];
+    let (problem, _, _) = sample(Interaction::I2);
+    let (m, n) = (problem.rows(), problem.size());
+    for key in 0..1u64 << (m * n) {
+        let topology = Topology::from_key(m, n, key);
+        let found = Synthesizer::new().solve(&problem, &topology, Options::default());
+        let reaches = |complex| alone(&problem, &topology, complex) <= found.theta * (1.0 + 1e-8);
+        match found.look {
+            Look::Complex => assert!(reaches(true), "{topology:?}"),
+            Look::Stacked => assert!(reaches(false) && !reaches(true), "{topology:?}"),
+            Look::Canonical | Look::Reversed => continue,
+        }
+        won[usize::from(found.look == Look::Stacked)] += 1;
+    }
+    assert!(won[0] >= 10 && won[1] >= 3, "{won:?}");
+}
