@@ -4,8 +4,8 @@ MUTANTS = {
     "policy/relabelling.rs": [
         ("rows of a model", "out[«order[i] * n + order[j]»]", "order[j] * n + order[i]"),
         ("who is alike", ".find(|&j| «same(i, j)»)", "!same(i, j)"),
-        ("seen by whom", "next[j].wrapping_add(mix(«!colours[i]»))", "colours[i]"),
-        ("places of a kind", "order[«place»] = player", "player"),
+        ("seen by whom", "wrapping_add(mix(«!players[i].colour»))", "players[i].colour"),
+        ("places of a kind", "order[at] = «i»;", "at"),
     ],
     "policy/transitions.rs": [
         ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),

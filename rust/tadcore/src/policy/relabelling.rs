@@ -28,6 +28,15 @@ pub(super) struct Kinds {
     some: bool,
 }
 
+/// A player's marks under one topology.
+struct Player {
+    /// Twice whom it sees, and one more if the attacker is among them.
+    sight: usize,
+    colour: u64,
+    /// The colour of the next round.
+    next: u64,
+}
+
 /// Spreads the bits of a colour (the finisher of SplitMix64).
 fn mix(x: u64) -> u64 {
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -56,40 +65,52 @@ impl Kinds {
 
     /// The model of a topology, and the order that leads to it.
     pub(super) fn model(&self, topology: &Topology) -> (Topology, Vec<usize>) {
-        let size = topology.size();
-        let mut order: Vec<usize> = (0..size).collect();
+        let mut order: Vec<usize> = (0..topology.size()).collect();
         if !self.some {
             return (topology.clone(), order);
         }
-        let mut colours: Vec<u64> = self.first.iter().map(|&first| mix(first as u64 + 1)).collect();
-        for i in 0..topology.rows() {
-            colours[i] = mix(colours[i] ^ u64::from(topology.sees_attacker(i)));
-        }
-        for _ in 0..ROUNDS {
-            // Sums do not depend on the order in which neighbours come.
-            let mut next = colours.clone();
-            for i in 0..topology.rows() {
-                for j in (0..size).filter(|&j| j != i && topology.sees(i, j)) {
-                    next[i] = next[i].wrapping_add(mix(colours[j]));
-                    next[j] = next[j].wrapping_add(mix(!colours[i]));
-                }
-            }
-            colours = next.into_iter().map(mix).collect();
-        }
         // The places of a kind go to its players, who sees most first: models that are alike are solved side by side, and
-        // lanes with the same unknowns waste none.
-        let sight = |i: usize| {
-            let seen = (0..size).filter(|&j| i < topology.rows() && topology.sees(i, j)).count();
-            std::cmp::Reverse((seen, topology.rows() > i && topology.sees_attacker(i)))
-        };
-        let mut players = order.clone();
-        players.sort_by_cached_key(|&i| (self.first[i], sight(i), colours[i]));
-        let mut places = order.clone();
-        places.sort_by_key(|&i| self.first[i]);
-        for (place, player) in places.into_iter().zip(players) {
-            order[place] = player;
+        // lanes with the same unknowns waste none. By insertion: there are few, and equal ones are to keep their order.
+        let players = self.players(topology);
+        let key = |i: usize| (std::cmp::Reverse(players[i].sight), players[i].colour);
+        for i in 1..topology.rows() {
+            let mut at = i;
+            while let Some(before) = (0..at).rev().find(|&j| self.first[j] == self.first[i]) {
+                if key(order[before]) <= key(i) {
+                    break;
+                }
+                order[at] = order[before];
+                at = before;
+            }
+            order[at] = i;
         }
         (topology.relabelled(&order), order)
+    }
+
+    /// What each player keeps under every relabelling.
+    fn players(&self, topology: &Topology) -> Vec<Player> {
+        let (rows, size) = (topology.rows(), topology.size());
+        let player = |i: usize| {
+            let seen = (0..size).filter(|&j| i < rows && topology.sees(i, j)).count();
+            let sight = 2 * seen + usize::from(i < rows && topology.sees_attacker(i));
+            let colour = mix(mix(self.first[i] as u64 + 1) ^ (sight & 1) as u64);
+            Player { sight, colour, next: colour }
+        };
+        let mut players: Vec<Player> = (0..size).map(player).collect();
+        for _ in 0..ROUNDS {
+            // Sums do not depend on the order in which neighbours come.
+            for i in 0..rows {
+                for j in (0..size).filter(|&j| j != i && topology.sees(i, j)) {
+                    players[i].next = players[i].next.wrapping_add(mix(players[j].colour));
+                    players[j].next = players[j].next.wrapping_add(mix(!players[i].colour));
+                }
+            }
+            for player in &mut players {
+                player.colour = mix(player.next);
+                player.next = player.colour;
+            }
+        }
+        players
     }
 }
 

@@ -113,6 +113,8 @@ pub(super) struct Search<'a> {
     pub limits: Limits,
     pub engine: &'a mut Engine,
     pub tasks: &'a mut Tasks,
+    /// The descents in doubled gains, when they are done.
+    pub doubled: &'a mut Tasks,
 }
 
 impl Search<'_> {
@@ -209,7 +211,7 @@ impl Search<'_> {
         self.descend::<N>(Kind::Doubled, entries);
         self.limits = limits;
 
-        let doubled = std::mem::take(self.tasks);
+        let doubled = std::mem::replace(self.tasks, std::mem::take(self.doubled));
         self.start(1);
         let mut looks = Vec::new();
         for task in 0..doubled.len() {
@@ -231,6 +233,7 @@ impl Search<'_> {
                 }
             }
         }
+        *self.doubled = doubled;
         looks
     }
 

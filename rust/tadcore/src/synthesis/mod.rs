@@ -120,6 +120,7 @@ impl Gains {
 pub struct Synthesizer {
     engine: Engine,
     tasks: Tasks,
+    doubled: Tasks,
 }
 
 impl Synthesizer {
@@ -178,7 +179,8 @@ impl Synthesizer {
                 Entry::new(start::variables(topology), start)
             })
             .collect();
-        let mut search = Search { problem, limits, engine: &mut self.engine, tasks: &mut self.tasks };
+        let Self { engine, tasks, doubled } = self;
+        let mut search = Search { problem, limits, engine, tasks, doubled };
         match options.method {
             Method::Newton => search.run::<N>(&mut entries),
             Method::Descent => {

@@ -23,7 +23,8 @@ pub(super) struct Variable {
 
 /// The variables of `topology`, row by row.
 pub(super) fn variables(topology: &Topology) -> Vec<Variable> {
-    let mut out = Vec::new();
+    // At most all that are seen and, in each row, the player itself.
+    let mut out = Vec::with_capacity(topology.edges() + topology.rows());
     let n = topology.size();
     for i in 0..topology.rows() {
         let own = i * n + i;

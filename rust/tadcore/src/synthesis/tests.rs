@@ -125,7 +125,7 @@ fn neighbours_and_width_change_nothing() {
             .map(|bits| Topology::from_words(m, n, &[bits]))
             .collect();
         let solve = |width, topologies: &[Topology]| {
-            let mut solver = Synthesizer { engine: Engine::of(width), tasks: Tasks::default() };
+            let mut solver = Synthesizer { engine: Engine::of(width), ..Synthesizer::default() };
             let mut all = Vec::new();
             solver.solve_all(&problem, topologies, Options::default(), |_, gains| all.push(gains));
             all
