@@ -157,8 +157,9 @@ impl Game {
         let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
         let policy = self.policy(py)?;
         let (gains, terms) = detach::interruptible(py, |_| {
-            let gains = policy.gains(step, &topology, options, &mut Synthesizer::new());
-            let terms = policy.problem(step).terms(policy.equilibrium().node(step), &gains.rows);
+            let problem = policy.problem(step);
+            let gains = policy.gains(&problem, &topology, options, &mut Synthesizer::new());
+            let terms = problem.terms(policy.equilibrium().node(step), &gains.rows);
             (gains, terms)
         })?;
         Ok(Gains::new(gains, terms, topology))

@@ -132,11 +132,11 @@ impl Policy {
         entry
     }
 
-    /// The gains at (step, topology) by any method, without looking at the table.
+    /// The gains of `problem`, one of this policy's, under a topology by any method, without looking at the table.
     #[must_use]
-    pub fn gains(&self, step: usize, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
+    pub fn gains(&self, problem: &Problem, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
         let (model, order) = self.kinds.model(topology);
-        let gains = solver.solve(&self.problem(step), &model, options);
+        let gains = solver.solve(problem, &model, options);
         Gains { rows: relabelling::back(&order, &gains.rows), ..gains }
     }
 
