@@ -79,7 +79,7 @@ MUTANTS = {
         ("batches: z = X − X_a", "«x - attacker[e % dim]»", "x + attacker[e % dim]"),
     ],
     "ensemble/strip.rs": [
-        ("batches: places that play", "«self.live - strip * LANES»", "self.live + strip * LANES"),
+        ("batches: places that play", "«live - strip * LANES»", "live + strip * LANES"),
         ("batches: lanes that play", "=> «(1 << count) - 1»,", "(1 << count) | 1"),
         ("batches: lane of a copy", "[«from % LANES»]", "to % LANES"),
         ("batches: strip of a copy", "lanes[«from / LANES * step + e»]", "to / LANES * step + e"),
@@ -120,8 +120,11 @@ MUTANTS = {
         ("batches: lane of a half", "let lane = «4 * half + l»;", "l"),
         ("batches: rows as columns", "«V::transpose4(next[x][q])»", "next[x][q]"),
         ("batches: row of a result", "z[(«4 * q + r») * D + x]", "r"),
-        ("batches: caught among who play", "«u32::from(caught) & strips.playing(strip)»", "u32::from(caught)"),
-        ("batches: strip that moves", "strips.z[«(first + b) * N * D»..]", "b * N * D"),
+        ("batches: caught among who play", "«u32::from(caught) & playing(strips.live, strip)»", "u32::from(caught)"),
+        ("batches: strip that moves", "strips.z[«first * N * D»..]", "0"),
+        ("batches: key of a half", "direct[«low[half]» as usize", "low[1 - half]"),
+        ("batches: next key", "low[half] >>= «16»;", "8"),
+        ("batches: a topology that is missing", "all &= «slot != 0»;", "true"),
     ],
     "ensemble/anysize.rs": [
         ("batches, any size: z_i − z_j", "«a[l] - b[l]»", "a[l] + b[l]"),
@@ -137,6 +140,13 @@ MUTANTS = {
         ("plain: a − b", "from_fn(|l| «a[l] - b[l]»)", "a[l] + b[l]"),
         ("plain: a ≤ b", "u8::from(«a[l] <= b[l]»)", "a[l] < b[l]"),
         ("plain: keys by a ≤ b", "if «a[l] <= b[l]» { bit }", "a[l] < b[l]"),
+        ("plain: low parts of keys", "(keys[first + l] & 0xFFFF) << («16 * l»)", "16 * (3 - l)"),
+        (
+            "256 bits: low parts of keys",
+            "«_mm256_packus_epi32(keys[0], keys[1])»",
+            "_mm256_packus_epi32(keys[1], keys[0])",
+        ),
+        ("512 bits: low parts of keys", "_mm_cvtsi128_si64(«words») as u64", "_mm_srli_si128::<8>(words)"),
         ("plain: sum + column · number", "«sum[a] + column[a] * by»", "sum[a] - column[a] * by"),
         ("plain: transpose", "«rows[r][c]»", "rows[c][r]"),
         (

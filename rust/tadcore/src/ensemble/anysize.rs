@@ -1,6 +1,6 @@
 //! A sweep for sizes known only at run time, trial after trial.
 
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips};
+use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, playing};
 use crate::policy::shelf::{Shelf, padded};
 
 /// One step of the strips from one on; a [`Sweep`](super::strip::Sweep) that does not look ahead.
@@ -17,7 +17,7 @@ pub(super) fn sweep_any(
     let (mut state, mut words) = (vec![0.0; n * d], vec![0; shape.words]);
     let mut next = vec![0.0; padded(n)];
     for strip in from..strips.live.div_ceil(LANES) {
-        let playing = strips.playing(strip);
+        let playing = playing(strips.live, strip);
         let z = &mut strips.z[strip * n * d..][..n * d];
         let sight = &strips.sight[strip * strips.sight_step..][..shape.rows];
         let capture = &strips.capture[strip * strips.capture_step..][..n];

@@ -67,15 +67,6 @@ pub(super) type Keys = Vec<[u64; LANES]>;
 pub(super) type Sweep = fn(&Shape, &mut Strips, usize, &Shelf, Option<&Shelf>, &mut Keys) -> Stop;
 
 impl Strips {
-    /// A bit for each place of a strip in which a trial plays.
-    #[inline(always)]
-    pub(super) fn playing(&self, strip: usize) -> u32 {
-        match self.live - strip * LANES {
-            count @ 0..LANES => (1 << count) - 1,
-            _ => u32::MAX,
-        }
-    }
-
     /// Copies a trial from one place to another.
     pub(super) fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
         let steps = [shape.size * shape.dim, self.sight_step, self.capture_step];
@@ -84,5 +75,14 @@ impl Strips {
                 lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
             }
         }
+    }
+}
+
+/// A bit for each place of a strip in which one of `live` trials plays.
+#[inline(always)]
+pub(super) fn playing(live: usize, strip: usize) -> u32 {
+    match live - strip * LANES {
+        count @ 0..LANES => (1 << count) - 1,
+        _ => u32::MAX,
     }
 }

@@ -4,11 +4,11 @@
 //! ends as it would alone, to the bit, at every [`Width`].
 //!
 //! Memory is what a step waits for, so nothing is asked for when it is needed: a block of strips is looked at before any
-//! of them moves, which puts independent work between a lookup and the product that needs it, and every strip fetches a
+//! of them moves, which puts independent work between a lookup and the product that needs it, and every block fetches a
 //! part of the next instant's shelf.
 
 use super::anysize::sweep_any;
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep};
+use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
 use super::vector::{Plain, Vector};
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Wide256, Wide512};
@@ -70,7 +70,7 @@ fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
     z: &[Lane],
     sight: &[Lane],
     capture: &[Lane],
-) -> ([u64; LANES], u8) {
+) -> (V::Keys, u8) {
     let mut keys = V::no_keys();
     let mut caught = 0;
     unrolled!(I < N, {
@@ -87,7 +87,7 @@ fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
             keys = V::see(keys, 1 << (J * N + I), d2, V::load(&sight[J]));
         });
     });
-    (V::keys(keys), caught)
+    (keys, caught)
 }
 
 /// z ← exp(Cδ) z for one strip whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
@@ -127,22 +127,36 @@ fn step<V: Vector, const N: usize, const D: usize, const Q: usize, const E: usiz
     }
 }
 
-/// The slots of eight topologies, or `None` where one is not on the shelf.
+/// Keys that are their own index are read as words of 16 bits.
+const _: () = assert!(DIRECT_BITS <= 16);
+
+/// Writes the slots of eight topologies; whether all are on the shelf.
 #[inline(always)]
-fn look_up<const N: usize, const M: usize>(seen: &[u64; LANES], direct: &[u16], shelf: &Shelf) -> Option<[u32; LANES]> {
-    let mut slots = [0; LANES];
-    for l in 0..LANES {
-        slots[l] = if N * M <= DIRECT_BITS {
-            // The mask changes nothing; it tells the compiler that the index lies within the slice.
-            u32::from(direct[seen[l] as usize & (direct.len() - 1)])
-        } else {
-            shelf.find(&[seen[l]])
-        };
-        if slots[l] == 0 {
-            return None;
+fn look_up<V: Vector, const N: usize, const M: usize>(
+    seen: V::Keys,
+    direct: &[u16],
+    shelf: &Shelf,
+    slots: &mut [u32; LANES],
+) -> bool {
+    let mut all = true;
+    if N * M <= DIRECT_BITS {
+        let mut low = V::low(seen);
+        for half in 0..2 {
+            for l in 0..LANES / 2 {
+                // The mask changes nothing; it tells the compiler that the index lies within the slice.
+                let slot = u32::from(direct[low[half] as usize & (direct.len() - 1)]);
+                low[half] >>= 16;
+                slots[half * LANES / 2 + l] = slot;
+                all &= slot != 0;
+            }
+        }
+    } else {
+        for (slot, key) in slots.iter_mut().zip(V::keys(seen)) {
+            *slot = shelf.find(&[key]);
+            all &= *slot != 0;
         }
     }
-    Some(slots)
+    all
 }
 
 /// One step of the strips from one on, as far as they can move: a [`Sweep`].
@@ -158,39 +172,41 @@ fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usi
     let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
     let direct = shelf.direct().get(..places).unwrap_or(&NOTHING[..places]);
     let end = strips.live.div_ceil(LANES);
-    let share = next.map_or(0, |next| next.lines().div_ceil(end.max(1)).min(MOST_LINES));
     let mut slots = [[0; LANES]; BLOCK];
     let mut first = from;
     while first < end {
-        let (mut ready, mut stop) = (0, Stop::End);
-        while ready < BLOCK.min(end - first) {
-            let strip = first + ready;
-            if let Some(next) = next {
-                for line in strip * share..(strip + 1) * share {
-                    next.prefetch(line);
-                }
+        let count = BLOCK.min(end - first);
+        if let Some(next) = next {
+            // As many lines for each strip of a step.
+            let lines = next.lines();
+            let share = lines.div_ceil(end).min(MOST_LINES);
+            for line in first * share..((first + count) * share).min(lines) {
+                next.prefetch(line);
             }
-            let z = &strips.z[strip * N * D..][..N * D];
+        }
+        let (mut ready, mut stop) = (0, Stop::End);
+        let block = &mut strips.z[first * N * D..][..count * N * D];
+        for (z, slots) in block.chunks_exact(N * D).zip(&mut slots) {
+            let strip = first + ready;
             let sight = &strips.sight[strip * strips.sight_step..][..M];
             let capture = &strips.capture[strip * strips.capture_step..][..N];
             let (seen, caught) = observe::<V, N, M, D>(z, sight, capture);
             if caught != 0 {
-                let caught = u32::from(caught) & strips.playing(strip);
+                let caught = u32::from(caught) & playing(strips.live, strip);
                 if caught != 0 {
                     stop = Stop::Caught(strip, caught);
                     break;
                 }
             }
-            let Some(found) = look_up::<N, M>(&seen, direct, shelf) else {
-                keys[0] = seen;
+            if !look_up::<V, N, M>(seen, direct, shelf, slots) {
+                keys[0] = V::keys(seen);
                 stop = Stop::Missing(strip);
                 break;
-            };
-            slots[ready] = found;
+            }
             ready += 1;
         }
-        for (b, slots) in slots[..ready].iter().enumerate() {
-            step::<V, N, D, Q, E>(&mut strips.z[(first + b) * N * D..][..N * D], slots, matrices);
+        for (z, slots) in block.chunks_exact_mut(N * D).zip(&slots[..ready]) {
+            step::<V, N, D, Q, E>(z, slots, matrices);
         }
         if stop != Stop::End {
             return stop;
@@ -261,107 +277,4 @@ pub(super) fn sweep_of(shape: &Shape, width: Width) -> Sweep {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ensemble::anysize::observe_any;
-    use crate::network::{self, Topology, squared_reach};
-    use crate::simulation::Reach;
-
-    /// Points whose distances are whole numbers, on the rims of whole radii: as one run sees and ends them.
-    #[test]
-    fn rims_belong_to_the_balls_at_every_size() {
-        let points = [
-            [9.0, 12.0],
-            [18.0, 24.0],
-            [0.0, 15.0],
-            [15.0, 36.0],
-            [-9.0, 12.0],
-            [0.0, 30.0],
-            [24.0, 45.0],
-            [-15.0, 0.0],
-        ];
-        let radii = [15.0, 30.0, 39.0, 15.0_f64.next_down(), 9.0, 6.0, 18.0, 12.0];
-        let shape = Shape { size: 3, rows: 2, dim: 2, words: 1 };
-        for turn in 0..radii.len() {
-            let row = |lane: usize, i: usize| points[(lane + 3 * i) % points.len()];
-            let radius = |lane: usize, i: usize| squared_reach(radii[(lane + i + turn) % radii.len()]);
-            let z: Vec<Lane> = (0..6).map(|e| std::array::from_fn(|l| row(l, e / 2)[e % 2])).collect();
-            let sight: Vec<Lane> = (0..2).map(|i| std::array::from_fn(|l| radius(l, i))).collect();
-            let capture: Vec<Lane> = (0..3).map(|i| std::array::from_fn(|l| radius(l, i + 2))).collect();
-            let mut keys = vec![[0; LANES]];
-            let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
-            let (compiled, ends) = observe::<Plain, 3, 2, 2>(&z, &sight, &capture);
-            assert_eq!((keys[0], caught), (compiled, u32::from(ends)));
-            // With nothing on the shelf a sweep stops with what it saw, or with whom it caught.
-            let nothing = [-1.0; LANES];
-            for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
-                let expected = if caught == 0 { Stop::Missing(0) } else { Stop::Caught(0, caught) };
-                for width in Width::all() {
-                    let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
-                    let mut strips = Strips { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
-                    let mut seen = vec![[0; LANES]];
-                    let stop = sweep_of(&shape, width)(&shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
-                    assert_eq!(stop, expected, "{width:?}");
-                    assert!(caught != 0 || seen == keys, "{width:?}");
-                }
-            }
-            for l in 0..LANES {
-                let state: Vec<f64> = z.iter().map(|lane| lane[l]).collect();
-                let mut topology = Topology::empty(2, 3);
-                network::observe(&state, 2, &[sight[0][l], sight[1][l]], &mut topology);
-                assert_eq!(topology.key(), Some(keys[0][l]));
-                let reach = Reach::new(&[2, 3, 4].map(|i| radii[(l + i + turn) % radii.len()]));
-                assert_eq!(reach.ends(&state, 2).is_some(), caught >> l & 1 == 1);
-            }
-        }
-    }
-
-    /// Stops, keys and states are those of the version that takes one strip after another, at every width.
-    #[test]
-    fn blocks_stop_where_single_strips_do() {
-        let shape = Shape { size: 4, rows: 3, dim: 2, words: 1 };
-        // In (−1, 1), without a pattern.
-        let wave = |i: usize| ((12.9898 * i as f64 + 4.1).sin() * 43758.5453).fract();
-        let mut shelf = Shelf::new(3, 4);
-        for key in (0..1 << 12).filter(|key| key % 41 != 3) {
-            let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
-            shelf.insert(&[key as u64], None, &matrix);
-        }
-        let strips = || Strips {
-            z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
-            sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
-            capture: vec![[0.04; LANES]; 4],
-            sight_step: 0,
-            capture_step: 0,
-            live: 40 * LANES - 3,
-        };
-        for width in Width::all() {
-            let (mut ours, mut single) = (strips(), strips());
-            let (mut keys, mut expected) = (vec![[0; LANES]], vec![[0; LANES]]);
-            let (mut from, mut counts) = (0, [0; 2]);
-            loop {
-                let stop = sweep_of(&shape, width)(&shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
-                assert_eq!(stop, sweep_any(&shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
-                assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
-                match stop {
-                    Stop::End => break,
-                    Stop::Caught(strip, _) => {
-                        // All eight a long way off, where nobody sees or catches anybody.
-                        for all in [&mut ours, &mut single] {
-                            all.z[8 * strip..][..8]
-                                .iter_mut()
-                                .enumerate()
-                                .for_each(|(e, z)| *z = [10.0 * (1 + e) as f64; 8]);
-                        }
-                        (from, counts[0]) = (strip, counts[0] + 1);
-                    }
-                    Stop::Missing(strip) => {
-                        assert_eq!(keys, expected);
-                        (from, counts[1]) = (strip + 1, counts[1] + 1);
-                    }
-                }
-            }
-            assert!(counts.iter().all(|&count| count > 3 && count < 30), "{counts:?}");
-        }
-    }
-}
+mod tests;

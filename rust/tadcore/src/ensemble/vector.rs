@@ -23,6 +23,8 @@ pub(super) trait Vector: Copy {
     /// The keys with `bit` set in the lanes in which a ≤ b.
     fn see(keys: Self::Keys, bit: u64, a: Self::Eight, b: Self::Eight) -> Self::Keys;
     fn keys(keys: Self::Keys) -> [u64; 8];
+    /// The low 16 bits of each key, four in a word.
+    fn low(keys: Self::Keys) -> [u64; 2];
 
     fn load4(from: &[f64; 4]) -> Self::Four;
     /// Column · number.
@@ -74,6 +76,10 @@ impl Vector for Plain {
     #[inline(always)]
     fn keys(keys: [u64; 8]) -> [u64; 8] {
         keys
+    }
+    #[inline(always)]
+    fn low(keys: [u64; 8]) -> [u64; 2] {
+        [0, 4].map(|first| (0..4).fold(0, |word, l| word | (keys[first + l] & 0xFFFF) << (16 * l)))
     }
     #[inline(always)]
     fn load4(from: &[f64; 4]) -> [f64; 4] {
@@ -208,6 +214,18 @@ mod x86 {
             }
             out
         }
+        #[inline(always)]
+        fn low(keys: Self::Keys) -> [u64; 2] {
+            // SAFETY: the caller is compiled for this width; registers alone.
+            unsafe {
+                // Words whose upper halves are zero: packed twice, within 128 bits.
+                let both = _mm256_packus_epi32(keys[0], keys[1]);
+                let both = _mm256_packus_epi32(both, both);
+                let (low, high) = (_mm256_castsi256_si128(both), _mm256_extracti128_si256::<1>(both));
+                let mixed = _mm_unpacklo_epi32(low, high);
+                [_mm_cvtsi128_si64(mixed) as u64, _mm_extract_epi64::<1>(mixed) as u64]
+            }
+        }
         fours!();
     }
 
@@ -264,6 +282,14 @@ mod x86 {
             // SAFETY: the caller is compiled for this width; writes the 8 words of `out`.
             unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), keys) };
             out
+        }
+        #[inline(always)]
+        fn low(keys: __m512i) -> [u64; 2] {
+            // SAFETY: the caller is compiled for this width; registers alone.
+            unsafe {
+                let words = _mm512_cvtepi64_epi16(keys);
+                [_mm_cvtsi128_si64(words) as u64, _mm_extract_epi64::<1>(words) as u64]
+            }
         }
         fours!();
     }
