@@ -1,4 +1,4 @@
-//! Numbers side by side: one, or four in each vector register.
+//! Numbers side by side: one, or four to sixteen in each vector register, in double or in single precision.
 //!
 //! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the IEEE one on
 //! each lane, the fused ones too, so a lane gives the bits that the number alone would give. The methods of the wide
@@ -8,22 +8,46 @@
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Eight, Four, Wide, transpose};
+pub(crate) use x86::{Eight, Eight32, Sixteen32, Wide, Wide32, transpose};
+
+/// A precision.
+pub(crate) trait Scalar: Copy + std::fmt::Debug + Mul<Output = Self> + Neg<Output = Self> {
+    /// The number, rounded.
+    fn of(x: f64) -> Self;
+}
+
+impl Scalar for f64 {
+    #[inline(always)]
+    fn of(x: f64) -> f64 {
+        x
+    }
+}
+
+impl Scalar for f32 {
+    #[inline(always)]
+    fn of(x: f64) -> f32 {
+        x as f32
+    }
+}
 
 /// One number, or several side by side.
 pub(crate) trait Number:
     Copy + std::fmt::Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// How many, at most eight.
+    /// How many, at most sixteen.
     const LANES: usize;
+    /// Whether in single precision.
+    const SINGLE: bool;
+    /// The precision.
+    type Scalar: Scalar;
     /// A yes or no for each lane.
     type Mask: Copy + std::fmt::Debug;
 
     /// The same number in all lanes.
-    fn splat(x: f64) -> Self;
+    fn all(x: Self::Scalar) -> Self;
     /// The number in one lane.
     fn lane(&self, lane: usize) -> f64;
     /// Replaces the number in one lane.
@@ -41,16 +65,34 @@ pub(crate) trait Number:
     /// `yes` where the mask says so, elsewhere `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// A mask from its bits, lane 0 the lowest.
-    fn mask(bits: u8) -> Self::Mask;
+    fn mask(bits: u16) -> Self::Mask;
     /// A mask as bits.
-    fn bits(mask: Self::Mask) -> u8;
-    /// The numbers as they are, where there is one lane.
+    fn bits(mask: Self::Mask) -> u16;
+    /// The numbers as they are, where there is one lane in double precision.
     fn alone(_numbers: &[Self]) -> Option<&[f64]> {
         None
     }
     /// The same, to be written.
     fn alone_mut(_numbers: &mut [Self]) -> Option<&mut [f64]> {
         None
+    }
+
+    /// The same number in all lanes, rounded to their precision.
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self::all(Self::Scalar::of(x))
+    }
+
+    /// The distance from 1 to the next number.
+    #[inline(always)]
+    fn epsilon() -> Self {
+        Self::splat(if Self::SINGLE { f32::EPSILON.into() } else { f64::EPSILON })
+    }
+
+    /// The smallest positive number of full precision.
+    #[inline(always)]
+    fn least() -> Self {
+        Self::splat(if Self::SINGLE { f32::MIN_POSITIVE.into() } else { f64::MIN_POSITIVE })
     }
 
     /// The larger one; the first where one is no number.
@@ -111,67 +153,77 @@ pub(crate) fn take<T: Number>(lanes: T::Mask, from: &[T], to: &mut [T]) {
     }
 }
 
-impl Number for f64 {
-    const LANES: usize = 1;
-    type Mask = bool;
+/// One number.
+macro_rules! alone {
+    ($type:ident, $single:literal, $alone:expr, $alone_mut:expr) => {
+        impl Number for $type {
+            const LANES: usize = 1;
+            const SINGLE: bool = $single;
+            type Scalar = $type;
+            type Mask = bool;
 
-    #[inline(always)]
-    fn splat(x: f64) -> f64 {
-        x
-    }
-    #[inline(always)]
-    fn lane(&self, _lane: usize) -> f64 {
-        *self
-    }
-    #[inline(always)]
-    fn set_lane(&mut self, _lane: usize, x: f64) {
-        *self = x;
-    }
-    #[inline(always)]
-    fn plus(self, x: f64, y: f64) -> f64 {
-        x.mul_add(y, self)
-    }
-    #[inline(always)]
-    fn minus(self, x: f64, y: f64) -> f64 {
-        (-x).mul_add(y, self)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> f64 {
-        f64::sqrt(self)
-    }
-    #[inline(always)]
-    fn abs(self) -> f64 {
-        f64::abs(self)
-    }
-    #[inline(always)]
-    fn less(self, other: f64) -> bool {
-        self < other
-    }
-    #[inline(always)]
-    fn at_most(self, other: f64) -> bool {
-        self <= other
-    }
-    #[inline(always)]
-    fn select(mask: bool, yes: f64, no: f64) -> f64 {
-        if mask { yes } else { no }
-    }
-    #[inline(always)]
-    fn mask(bits: u8) -> bool {
-        bits & 1 == 1
-    }
-    #[inline(always)]
-    fn bits(mask: bool) -> u8 {
-        u8::from(mask)
-    }
-    #[inline(always)]
-    fn alone(numbers: &[f64]) -> Option<&[f64]> {
-        Some(numbers)
-    }
-    #[inline(always)]
-    fn alone_mut(numbers: &mut [f64]) -> Option<&mut [f64]> {
-        Some(numbers)
-    }
+            #[inline(always)]
+            fn all(x: $type) -> $type {
+                x
+            }
+            #[inline(always)]
+            fn lane(&self, _lane: usize) -> f64 {
+                f64::from(*self)
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, _lane: usize, x: f64) {
+                *self = Scalar::of(x);
+            }
+            #[inline(always)]
+            fn plus(self, x: $type, y: $type) -> $type {
+                x.mul_add(y, self)
+            }
+            #[inline(always)]
+            fn minus(self, x: $type, y: $type) -> $type {
+                (-x).mul_add(y, self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> $type {
+                $type::sqrt(self)
+            }
+            #[inline(always)]
+            fn abs(self) -> $type {
+                $type::abs(self)
+            }
+            #[inline(always)]
+            fn less(self, other: $type) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn at_most(self, other: $type) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn select(mask: bool, yes: $type, no: $type) -> $type {
+                if mask { yes } else { no }
+            }
+            #[inline(always)]
+            fn mask(bits: u16) -> bool {
+                bits & 1 == 1
+            }
+            #[inline(always)]
+            fn bits(mask: bool) -> u16 {
+                u16::from(mask)
+            }
+            #[inline(always)]
+            fn alone(numbers: &[$type]) -> Option<&[f64]> {
+                $alone(numbers)
+            }
+            #[inline(always)]
+            fn alone_mut(numbers: &mut [$type]) -> Option<&mut [f64]> {
+                $alone_mut(numbers)
+            }
+        }
+    };
 }
+
+alone!(f64, false, Some, Some);
+alone!(f32, true, |_| None, |_| None);
 
 #[cfg(test)]
 mod tests;

@@ -3,8 +3,18 @@
 use super::*;
 use crate::width::Width;
 
-/// Pairs of them are in any order, equal, of both signs, zero, and no numbers.
-const NUMBERS: [f64; 11] = [0.0, -0.0, 1.0, -1.0, 1.5, -2.75, 0.1, 3e200, -7e-200, f64::INFINITY, f64::NAN];
+/// Pairs of them are in any order, equal, of both signs, zero, and no numbers; all are numbers of single precision.
+const NUMBERS: [f64; 11] =
+    [0.0, -0.0, 1.0, -1.0, 1.5, -2.75, 0.1_f32 as f64, 3e38_f32 as f64, -7e-38_f32 as f64, f64::INFINITY, f64::NAN];
+
+/// A result in double precision as one in the other: rounded twice it is what is rounded once, but for sums of products.
+fn rounded(single: bool, x: f64) -> f64 {
+    if single { f64::from(x as f32) } else { x }
+}
+
+fn fused(single: bool, x: f64, y: f64, to: f64) -> f64 {
+    if single { f64::from((x as f32).mul_add(y as f32, to as f32)) } else { x.mul_add(y, to) }
+}
 
 fn same(found: f64, expected: f64) -> bool {
     found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan()
@@ -24,19 +34,20 @@ fn check<T: Number>() {
         for step in 1..NUMBERS.len() {
             let (a, x, y): (T, T, T) = (filled(from, 1), filled(2 * from, step), filled(from + step, step));
             let (less, at_most) = (T::bits(x.less(y)), T::bits(x.at_most(y)));
-            let mask = (from * NUMBERS.len() + step) as u8;
+            let mask = ((from * NUMBERS.len() + step) * 0x0101) as u16;
             let chosen = T::select(T::mask(mask), x, y);
-            let all = if T::LANES == 8 { u8::MAX } else { (1 << T::LANES) - 1 };
+            let all = ((1_u32 << T::LANES) - 1) as u16;
             assert_eq!(T::bits(T::mask(mask)) & all, mask & all);
             assert_eq!((less | at_most) & !all, 0);
             for lane in 0..T::LANES {
                 let (p, u, v) = (a.lane(lane), x.lane(lane), y.lane(lane));
                 assert!(same(u, NUMBERS[(2 * from + lane * step) % NUMBERS.len()]));
-                assert!(same((x + y).lane(lane), u + v) && same((x - y).lane(lane), u - v));
-                assert!(same((x * y).lane(lane), u * v) && same((x / y).lane(lane), u / v));
-                assert!(same(a.plus(x, y).lane(lane), f64::mul_add(u, v, p)));
-                assert!(same(a.minus(x, y).lane(lane), f64::mul_add(-u, v, p)));
-                assert!(same(x.sqrt().lane(lane), f64::sqrt(u)) && same(x.abs().lane(lane), f64::abs(u)));
+                let is = |found: T, expected: f64| same(found.lane(lane), rounded(T::SINGLE, expected));
+                assert!(is(x + y, u + v) && is(x - y, u - v));
+                assert!(is(x * y, u * v) && is(x / y, u / v), "{u} {v}");
+                assert!(same(a.plus(x, y).lane(lane), fused(T::SINGLE, u, v, p)));
+                assert!(same(a.minus(x, y).lane(lane), fused(T::SINGLE, -u, v, p)));
+                assert!(is(x.sqrt(), f64::sqrt(u)) && is(x.abs(), f64::abs(u)));
                 assert_eq!((less >> lane & 1 == 1, at_most >> lane & 1 == 1), (u < v, u <= v), "{u} {v}");
                 assert!(same(x.or_larger(y).lane(lane), if u < v { v } else { u }), "{u} {v}");
                 assert!(same(chosen.lane(lane), if mask >> lane & 1 == 1 { u } else { v }));
@@ -60,13 +71,13 @@ fn check<T: Number>() {
             let expected: f64 = x.iter().zip(&y).map(|(x, y)| x.lane(lane) * y.lane(lane)).sum();
             assert_eq!((dot(&x, &y).lane(lane), dot_in_order(&x, &y).lane(lane)), (expected, expected));
             let squares: f64 = x.iter().map(|x| x.lane(lane) * x.lane(lane)).sum();
-            assert_eq!(norm(&x).lane(lane), squares.sqrt());
+            assert_eq!(norm(&x).lane(lane), rounded(T::SINGLE, squares.sqrt()));
         }
         let before = y.clone();
-        take(T::mask(0b0101_0010), &x, &mut y);
+        take(T::mask(0b1001_1100_0101_0010), &x, &mut y);
         for ((y, x), before) in y.iter().zip(&x).zip(&before) {
             for lane in 0..T::LANES {
-                let from = if 0b0101_0010 >> lane & 1 == 1 { x } else { before };
+                let from = if 0b1001_1100_0101_0010 >> lane & 1 == 1 { x } else { before };
                 assert_eq!(y.lane(lane), from.lane(lane));
             }
         }
@@ -76,14 +87,19 @@ fn check<T: Number>() {
 #[test]
 fn a_lane_does_what_a_number_alone_does() {
     check::<f64>();
+    check::<f32>();
     #[cfg(target_arch = "x86_64")]
     for width in Width::all() {
         match width {
             Width::Baseline => {}
-            Width::Avx2 => check::<Wide>(),
+            Width::Avx2 => {
+                check::<Wide>();
+                check::<Wide32>();
+            }
             Width::Avx512 => {
-                check::<Four>();
                 check::<Eight>();
+                check::<Eight32>();
+                check::<Sixteen32>();
             }
         }
     }

@@ -8,111 +8,138 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use super::Number;
 
-/// AVX2: four numbers in a register.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wide(__m256d);
-
+/// The operators of a register.
 macro_rules! operators {
-    ($($trait:ident $name:ident $of:ident),*) => {$(
-        impl $trait for Wide {
+    ($type:ident: $($trait:ident $name:ident $of:ident),*) => {$(
+        impl $trait for $type {
             type Output = Self;
             #[inline(always)]
             fn $name(self, other: Self) -> Self {
-                // SAFETY: the caller is compiled for AVX2; registers alone.
+                // SAFETY: the caller is compiled for these instructions; registers alone.
                 unsafe { Self($of(self.0, other.0)) }
             }
         }
     )*};
 }
 
-operators!(Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
+/// AVX2: one register, and masks of its kind.
+macro_rules! wide {
+    ($(#[$doc:meta])* $type:ident $register:ident $scalar:ident $lanes:literal $single:literal: $add:ident $sub:ident $mul:ident $div:ident
+     $plus:ident $minus:ident $sqrt:ident $andnot:ident $set:ident $store:ident $compare:ident $blend:ident $movemask:ident
+     $own:expr, $every:ident $and:ident $equal:ident $cast:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy)]
+        pub(crate) struct $type($register);
 
-impl Number for Wide {
-    const LANES: usize = 4;
-    type Mask = __m256d;
+        operators!($type: Add add $add, Sub sub $sub, Mul mul $mul, Div div $div);
 
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { Self(_mm256_set1_pd(x)) }
-    }
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> f64 {
-        let mut out = [0.0; 4];
-        // SAFETY: the caller is compiled for AVX2; writes the 4 numbers of `out`.
-        unsafe { _mm256_storeu_pd(out.as_mut_ptr(), self.0) };
-        out[lane]
-    }
-    #[inline(always)]
-    fn set_lane(&mut self, lane: usize, x: f64) {
-        *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
-    }
-    #[inline(always)]
-    fn plus(self, x: Self, y: Self) -> Self {
-        // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
-        unsafe { Self(_mm256_fmadd_pd(x.0, y.0, self.0)) }
-    }
-    #[inline(always)]
-    fn minus(self, x: Self, y: Self) -> Self {
-        // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
-        unsafe { Self(_mm256_fnmadd_pd(x.0, y.0, self.0)) }
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { Self(_mm256_sqrt_pd(self.0)) }
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)) }
-    }
-    #[inline(always)]
-    fn less(self, other: Self) -> __m256d {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0) }
-    }
-    #[inline(always)]
-    fn at_most(self, other: Self) -> __m256d {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0) }
-    }
-    #[inline(always)]
-    fn select(mask: __m256d, yes: Self, no: Self) -> Self {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { Self(_mm256_blendv_pd(no.0, yes.0, mask)) }
-    }
-    #[inline(always)]
-    fn mask(bits: u8) -> __m256d {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe {
-            let (own, bits) = (_mm256_setr_epi64x(1, 2, 4, 8), _mm256_set1_epi64x(i64::from(bits)));
-            _mm256_castsi256_pd(_mm256_cmpeq_epi64(_mm256_and_si256(bits, own), own))
+        impl Number for $type {
+            const LANES: usize = $lanes;
+            const SINGLE: bool = $single;
+            type Scalar = $scalar;
+            type Mask = $register;
+
+            #[inline(always)]
+            fn all(x: $scalar) -> Self {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { Self($set(x)) }
+            }
+            #[inline(always)]
+            fn lane(&self, lane: usize) -> f64 {
+                let mut out = [0.0; $lanes];
+                // SAFETY: the caller is compiled for AVX2; writes all numbers of `out`.
+                unsafe { $store(out.as_mut_ptr(), self.0) };
+                f64::from(out[lane])
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, lane: usize, x: f64) {
+                *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
+            }
+            #[inline(always)]
+            fn plus(self, x: Self, y: Self) -> Self {
+                // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+                unsafe { Self($plus(x.0, y.0, self.0)) }
+            }
+            #[inline(always)]
+            fn minus(self, x: Self, y: Self) -> Self {
+                // SAFETY: the caller is compiled for AVX2 and FMA; registers alone.
+                unsafe { Self($minus(x.0, y.0, self.0)) }
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { Self($sqrt(self.0)) }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { Self($andnot($set(-0.0), self.0)) }
+            }
+            #[inline(always)]
+            fn less(self, other: Self) -> $register {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { $compare::<_CMP_LT_OQ>(self.0, other.0) }
+            }
+            #[inline(always)]
+            fn at_most(self, other: Self) -> $register {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { $compare::<_CMP_LE_OQ>(self.0, other.0) }
+            }
+            #[inline(always)]
+            fn select(mask: $register, yes: Self, no: Self) -> Self {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { Self($blend(no.0, yes.0, mask)) }
+            }
+            #[inline(always)]
+            fn mask(bits: u16) -> $register {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe {
+                    let (own, bits) = ($own, $every(bits.into()));
+                    $cast($equal($and(bits, own), own))
+                }
+            }
+            #[inline(always)]
+            fn bits(mask: $register) -> u16 {
+                // SAFETY: the caller is compiled for AVX2; registers alone.
+                unsafe { $movemask(mask) as u16 }
+            }
         }
-    }
-    #[inline(always)]
-    fn bits(mask: __m256d) -> u8 {
-        // SAFETY: the caller is compiled for AVX2; registers alone.
-        unsafe { _mm256_movemask_pd(mask) as u8 }
-    }
+    };
 }
+
+wide!(
+    /// AVX2: four numbers in a register.
+    Wide __m256d f64 4 false: _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
+    _mm256_fmadd_pd _mm256_fnmadd_pd _mm256_sqrt_pd _mm256_andnot_pd _mm256_set1_pd _mm256_storeu_pd _mm256_cmp_pd _mm256_blendv_pd
+    _mm256_movemask_pd _mm256_setr_epi64x(1, 2, 4, 8), _mm256_set1_epi64x _mm256_and_si256 _mm256_cmpeq_epi64 _mm256_castsi256_pd
+);
+
+wide!(
+    /// AVX2: eight numbers in single precision.
+    Wide32 __m256 f32 8 true: _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps
+    _mm256_fmadd_ps _mm256_fnmadd_ps _mm256_sqrt_ps _mm256_andnot_ps _mm256_set1_ps _mm256_storeu_ps _mm256_cmp_ps _mm256_blendv_ps
+    _mm256_movemask_ps _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128), _mm256_set1_epi32 _mm256_and_si256 _mm256_cmpeq_epi32
+    _mm256_castsi256_ps
+);
 
 /// AVX-512: one register and its masks.
 macro_rules! masked {
-    ($(#[$doc:meta])* $type:ident $register:ident $lanes:literal: $add:ident $sub:ident $mul:ident $div:ident
+    ($(#[$doc:meta])* $type:ident $register:ident $scalar:ident $mask:ident $lanes:literal $single:literal: $add:ident $sub:ident $mul:ident $div:ident
      $plus:ident $minus:ident $sqrt:ident $abs:ident $set:ident $store:ident $compare:ident $blend:ident) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy)]
         pub(crate) struct $type($register);
 
-        masked!(@operators $type: Add add $add, Sub sub $sub, Mul mul $mul, Div div $div);
+        operators!($type: Add add $add, Sub sub $sub, Mul mul $mul, Div div $div);
 
         impl Number for $type {
             const LANES: usize = $lanes;
-            type Mask = __mmask8;
+            const SINGLE: bool = $single;
+            type Scalar = $scalar;
+            type Mask = $mask;
 
             #[inline(always)]
-            fn splat(x: f64) -> Self {
+            fn all(x: $scalar) -> Self {
                 // SAFETY: the caller is compiled for AVX-512; registers alone.
                 unsafe { Self($set(x)) }
             }
@@ -121,11 +148,11 @@ macro_rules! masked {
                 let mut out = [0.0; $lanes];
                 // SAFETY: the caller is compiled for AVX-512; writes all numbers of `out`.
                 unsafe { $store(out.as_mut_ptr(), self.0) };
-                out[lane]
+                f64::from(out[lane])
             }
             #[inline(always)]
             fn set_lane(&mut self, lane: usize, x: f64) {
-                *self = Self::select(1 << lane, Self::splat(x), *self);
+                *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
             }
             #[inline(always)]
             fn plus(self, x: Self, y: Self) -> Self {
@@ -148,58 +175,54 @@ macro_rules! masked {
                 unsafe { Self($abs(self.0)) }
             }
             #[inline(always)]
-            fn less(self, other: Self) -> __mmask8 {
+            fn less(self, other: Self) -> $mask {
                 // SAFETY: the caller is compiled for AVX-512; registers alone.
                 unsafe { $compare::<_CMP_LT_OQ>(self.0, other.0) }
             }
             #[inline(always)]
-            fn at_most(self, other: Self) -> __mmask8 {
+            fn at_most(self, other: Self) -> $mask {
                 // SAFETY: the caller is compiled for AVX-512; registers alone.
                 unsafe { $compare::<_CMP_LE_OQ>(self.0, other.0) }
             }
             #[inline(always)]
-            fn select(mask: __mmask8, yes: Self, no: Self) -> Self {
+            fn select(mask: $mask, yes: Self, no: Self) -> Self {
                 // SAFETY: the caller is compiled for AVX-512; registers alone.
                 unsafe { Self($blend(mask, no.0, yes.0)) }
             }
             #[inline(always)]
-            fn mask(bits: u8) -> __mmask8 {
-                bits
+            fn mask(bits: u16) -> $mask {
+                bits as $mask
             }
             #[inline(always)]
-            fn bits(mask: __mmask8) -> u8 {
-                mask
+            fn bits(mask: $mask) -> u16 {
+                mask.into()
             }
         }
     };
-    (@operators $type:ident: $($trait:ident $name:ident $of:ident),*) => {$(
-        impl $trait for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn $name(self, other: Self) -> Self {
-                // SAFETY: the caller is compiled for AVX-512; registers alone.
-                unsafe { Self($of(self.0, other.0)) }
-            }
-        }
-    )*};
 }
 
 masked!(
     /// AVX-512: eight numbers in a register.
-    Eight __m512d 8: _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
+    Eight __m512d f64 __mmask8 8 false: _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
     _mm512_fmadd_pd _mm512_fnmadd_pd _mm512_sqrt_pd _mm512_abs_pd _mm512_set1_pd _mm512_storeu_pd _mm512_cmp_pd_mask _mm512_mask_blend_pd
 );
 
 masked!(
-    /// AVX-512VL: four numbers in half a register.
-    Four __m256d 4: _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
-    _mm256_fmadd_pd _mm256_fnmadd_pd _mm256_sqrt_pd absolute _mm256_set1_pd _mm256_storeu_pd _mm256_cmp_pd_mask _mm256_mask_blend_pd
+    /// AVX-512: sixteen numbers in single precision.
+    Sixteen32 __m512 f32 __mmask16 16 true: _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps
+    _mm512_fmadd_ps _mm512_fnmadd_ps _mm512_sqrt_ps _mm512_abs_ps _mm512_set1_ps _mm512_storeu_ps _mm512_cmp_ps_mask _mm512_mask_blend_ps
+);
+
+masked!(
+    /// AVX-512VL: eight numbers in single precision, in half a register.
+    Eight32 __m256 f32 __mmask8 8 true: _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps
+    _mm256_fmadd_ps _mm256_fnmadd_ps _mm256_sqrt_ps absolute _mm256_set1_ps _mm256_storeu_ps _mm256_cmp_ps_mask _mm256_mask_blend_ps
 );
 
 #[inline(always)]
-unsafe fn absolute(x: __m256d) -> __m256d {
+unsafe fn absolute(x: __m256) -> __m256 {
     // SAFETY: the caller is compiled for AVX-512VL; registers alone.
-    unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), x) }
+    unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), x) }
 }
 
 /// Rows as columns.

@@ -20,12 +20,12 @@
 use super::layout::{Form, Slot};
 use super::newton::Objective;
 use super::objective::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
-use super::problem::Problem;
+use super::parts::Parts;
 use crate::lanes::{Number, dot, norm, sum_of_squares, take};
 
 /// Θ over doubled gains.
-pub(super) struct Doubled<'a, T, const N: usize> {
-    problem: &'a Problem,
+pub(super) struct Doubled<'a, T: Number, const N: usize> {
+    problem: &'a Parts<T::Scalar>,
     /// s: 1 for complex gains, 0 for stacked ones.
     complex: T,
     /// σ.
@@ -45,7 +45,7 @@ pub(super) struct Doubled<'a, T, const N: usize> {
 
 impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
     #[inline(always)]
-    pub(super) fn new(problem: &'a Problem) -> Self {
+    pub(super) fn new(problem: &'a Parts<T::Scalar>) -> Self {
         let (n, m, groups) = (problem.size, problem.rows, problem.coupling.len());
         let zero = T::splat(0.0);
         Self {
@@ -85,18 +85,17 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
         let (entry, own) = if lower { (v.entry - half, v.own - half) } else { (v.entry, v.own) };
         let (i, a) = (entry / n, entry % n);
         let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
-        let factor = T::splat(4.0 * p.gamma[0] * p.r[i]);
-        let strength = 4.0 * p.gamma[0] * p.r[i];
+        let strength = T::all(p.strength[i]);
         let players = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(&p.r).zip(self.gram[3 * i * m..].chunks_exact(3));
         let (cross, out) = out.split_at_mut(if lower { half } else { 0 });
         for (j, (h, (((aj, bj), &r), gram))) in cross.chunks_exact_mut(n).zip(players.clone()).enumerate() {
-            let f = T::splat(strength * r);
+            let f = strength * T::all(r);
             let (fa, sb) = (f * along(aj, a, i, v), s * (f * along(bj, a, i, v)));
             for b in 0..n {
                 h[b] = (fa * bi[b]).plus(sb, ai[b]);
             }
             if j == i {
-                add_row(h, T::splat(0.0) - factor, imaginary, n, a, i, v);
+                add_row(h, T::splat(0.0) - strength, imaginary, n, a, i, v);
             }
             add_unit(h, a, i, v, gram[2]);
         }
@@ -107,14 +106,14 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
             if lower {
                 let (q, own) = (&minus[at..][..n], &minus[at_own..][..n]);
                 for b in 0..n {
-                    let minus = T::splat(q[b]).minus(v.relative, T::splat(own[b]));
+                    let minus = T::all(q[b]).minus(v.relative, T::all(own[b]));
                     h[b] = T::select(stacked, h[b], minus);
                 }
             }
             if j == i {
-                add_row(h, factor, real, n, a, i, v);
+                add_row(h, strength, real, n, a, i, v);
             }
-            let f = T::splat(strength * r);
+            let f = strength * T::all(r);
             let (fa, fb) = (f * along(aj, a, i, v), f * along(bj, a, i, v));
             let (first, second, x, y) = if lower { (fb, s * fa, bi, ai) } else { (fa, s * fb, ai, bi) };
             for b in 0..n {
@@ -147,7 +146,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let (real, imaginary) = self.x[..2 * n * n].split_at_mut(n * n);
         let delta = &mut self.delta[..m * n];
         for (x, &t) in real.iter_mut().zip(&p.target[..n * n]) {
-            *x = T::splat(-t);
+            *x = T::all(-t);
         }
         for x in imaginary.iter_mut() {
             *x = T::splat(0.0);
@@ -155,7 +154,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let mut rest = T::splat(0.0);
         let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(delta.chunks_exact_mut(n));
         for (i, ((ai, bi), di)) in rows.enumerate() {
-            let r = T::splat(p.r[i]);
+            let r = T::all(p.r[i]);
             for (a, (real, imaginary)) in real.chunks_exact_mut(n).zip(imaginary.chunks_exact_mut(n)).enumerate() {
                 let (fa, fb) = (r * ai[a], r * bi[a]);
                 for b in 0..n {
@@ -164,9 +163,9 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
                 }
             }
             for (b, &f) in p.fne[i * n..][..n].iter().enumerate() {
-                di[b] = ai[b] - T::splat(f);
+                di[b] = ai[b] - T::all(f);
             }
-            rest = rest.plus(T::splat(p.closeness[i]), sum_of_squares(di) + sum_of_squares(bi));
+            rest = rest.plus(T::all(p.closeness[i]), sum_of_squares(di) + sum_of_squares(bi));
         }
         for x in imaginary.iter_mut() {
             *x = self.complex * *x;
@@ -180,7 +179,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             symmetric_product(e, n, &w[..m * n], ib, self.sign);
             rest = rest + sum_of_squares(e);
         }
-        rest.plus(T::splat(p.gamma[0]), sum_of_squares(real) + sum_of_squares(imaginary))
+        rest.plus(T::all(p.first), sum_of_squares(real) + sum_of_squares(imaginary))
     }
 
     #[inline(always)]
@@ -194,16 +193,16 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(self.delta.chunks_exact(n));
         let slopes = out_a.chunks_exact_mut(n).zip(out_b.chunks_exact_mut(n));
         for (i, (((ai, bi), di), (ga, gb))) in rows.zip(slopes).enumerate() {
-            let c = T::splat(2.0 * p.closeness[i]);
+            let c = T::splat(2.0) * T::all(p.closeness[i]);
             for b in 0..n {
                 ga[b] = c * di[b];
                 gb[b] = c * bi[b];
             }
-            let factor = 4.0 * p.gamma[0] * p.r[i];
-            add_product(ga, n, T::splat(factor), ai, real);
-            add_product(ga, n, T::splat(-factor), bi, imaginary);
-            add_product(gb, n, T::splat(factor), ai, imaginary);
-            add_product(gb, n, T::splat(factor), bi, real);
+            let factor = T::all(p.strength[i]);
+            add_product(ga, n, factor, ai, real);
+            add_product(ga, n, T::splat(0.0) - factor, bi, imaginary);
+            add_product(gb, n, factor, ai, imaginary);
+            add_product(gb, n, factor, bi, real);
             let (real, imaginary) = self.coupled[..2 * groups * n * n].split_at(groups * n * n);
             for ((w, er), ei) in p.coupling.iter().zip(real.chunks_exact(n * n)).zip(imaginary.chunks_exact(n * n)) {
                 let w = &w[i * n..(i + 1) * n];
@@ -228,7 +227,7 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
             let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
             for j in 0..m {
                 let (aj, bj) = (&ra[j * n..][..n], &ib[j * n..][..n]);
-                let f = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
+                let f = T::all(p.strength[i]) * T::all(p.r[j]);
                 let gram = &mut self.gram[3 * (i * m + j)..][..3];
                 if j <= i {
                     let (aa, bb) = (dot(ai, aj), dot(bi, bj));
@@ -241,11 +240,11 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
 
     #[inline(always)]
     fn gradient_scale(&self, g: &[T]) -> T {
-        self.scale.or_larger(norm(g) * T::splat(f64::MIN_POSITIVE))
+        self.scale.or_larger(norm(g) * T::least())
     }
 
     #[inline(always)]
     fn value_scale(&self) -> f64 {
-        self.problem.value_scale()
+        self.problem.scale.value
     }
 }

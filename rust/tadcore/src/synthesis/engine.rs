@@ -7,12 +7,13 @@ use super::dense::{self, Means};
 use super::doubled::Doubled;
 use super::newton::{Objective, minimise};
 use super::objective::{Certificate, RealGains};
+use super::parts::Parts;
 use super::problem::Problem;
 use super::tasks::{Limits, Owner, Tasks};
 use super::workspace::Workspace;
 use crate::lanes::Number;
 #[cfg(target_arch = "x86_64")]
-use crate::lanes::{Eight, Four, Wide};
+use crate::lanes::{Eight, Eight32, Sixteen32, Wide, Wide32};
 use crate::width::Width;
 
 /// N up to which there is a version with constant loop bounds.
@@ -31,7 +32,9 @@ pub(super) enum Kind {
     Real,
     /// In the gains themselves; each end point is then tried for the certificate.
     Certified,
-    /// In twice as many, complex or stacked.
+    /// In the gains themselves, in single precision where the problem has it.
+    Scout,
+    /// In twice as many, complex or stacked; in single precision where the problem has it.
     Doubled,
 }
 
@@ -40,12 +43,17 @@ pub(super) enum Kind {
 pub(super) struct Engine {
     width: Width,
     one: Workspace<f64>,
+    one32: Workspace<f32>,
     #[cfg(target_arch = "x86_64")]
     wide: Workspace<Wide>,
     #[cfg(target_arch = "x86_64")]
-    four: Workspace<Four>,
+    wide32: Workspace<Wide32>,
     #[cfg(target_arch = "x86_64")]
     eight: Workspace<Eight>,
+    #[cfg(target_arch = "x86_64")]
+    eight32: Workspace<Eight32>,
+    #[cfg(target_arch = "x86_64")]
+    sixteen32: Workspace<Sixteen32>,
 }
 
 impl Default for Engine {
@@ -54,18 +62,32 @@ impl Default for Engine {
     }
 }
 
+/// What a list needs besides its numbers.
+struct List<'a> {
+    kind: Kind,
+    tasks: &'a mut Tasks,
+    owners: &'a [Owner<'a>],
+    limits: Limits,
+    means: Means,
+}
+
 impl Engine {
     /// An engine of a width that the processor has.
     pub(super) fn of(width: Width) -> Self {
         Self {
             width,
             one: Workspace::default(),
+            one32: Workspace::default(),
             #[cfg(target_arch = "x86_64")]
             wide: Workspace::default(),
             #[cfg(target_arch = "x86_64")]
-            four: Workspace::default(),
+            wide32: Workspace::default(),
             #[cfg(target_arch = "x86_64")]
             eight: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            eight32: Workspace::default(),
+            #[cfg(target_arch = "x86_64")]
+            sixteen32: Workspace::default(),
         }
     }
 
@@ -79,37 +101,81 @@ impl Engine {
         limits: Limits,
     ) {
         let means = Means { library: problem.size > CONSTANT_UP_TO, width: self.width };
+        let mut list = List { kind, tasks, owners, limits, means };
+        match (kind, single::<N>(problem)) {
+            (Kind::Scout | Kind::Doubled, Some(parts)) => self.run_single::<N>(parts, &mut list),
+            _ => self.run_double::<N>(&problem.double, &mut list),
+        }
+    }
+
+    fn run_double<const N: usize>(&mut self, parts: &Parts<f64>, list: &mut List) {
         #[cfg(target_arch = "x86_64")]
-        if const { 0 < N && N <= SIDE_BY_SIDE_UP_TO } && tasks.len() >= SIDE_BY_SIDE_FROM {
+        if const { side_by_side(N) } && list.tasks.len() >= SIDE_BY_SIDE_FROM && list.kind != Kind::Doubled {
             match self.width {
                 Width::Baseline => {}
                 Width::Avx2 => {
                     debug_assert!(std::arch::is_x86_feature_detected!("fma"));
                     // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
-                    return unsafe { run_avx2::<N>(kind, problem, tasks, owners, limits, means, &mut self.wide) };
+                    return unsafe { real_avx2::<N>(parts, list, &mut self.wide) };
                 }
                 Width::Avx512 => {
                     debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
                     // SAFETY: this variant exists only where the processor said that it has AVX-512F, VL and FMA.
-                    return unsafe {
-                        if kind == Kind::Doubled {
-                            run_avx512_doubled::<N>(problem, tasks, owners, limits, means, &mut self.four)
-                        } else {
-                            run_avx512_real::<N>(kind, problem, tasks, owners, limits, means, &mut self.eight)
-                        }
-                    };
+                    return unsafe { real_avx512::<N>(parts, list, &mut self.eight) };
                 }
             }
         }
         // Every width gives the same bits; where the processor has only the target's, one version for all sizes will do.
         #[cfg(target_arch = "x86_64")]
         if self.width == Width::Baseline {
-            return run::<f64, 0>(kind, problem, tasks, owners, limits, means, &mut self.one);
+            return run::<f64, 0>(parts, list, &mut self.one);
         }
         debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
         // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
-        unsafe { run_one::<N>(kind, problem, tasks, owners, limits, means, &mut self.one) }
+        unsafe { one::<N>(parts, list, &mut self.one) }
     }
+
+    fn run_single<const N: usize>(&mut self, parts: &Parts<f32>, list: &mut List) {
+        #[cfg(target_arch = "x86_64")]
+        if const { side_by_side(N) } && list.tasks.len() >= SIDE_BY_SIDE_FROM {
+            match self.width {
+                Width::Baseline => {}
+                Width::Avx2 => {
+                    debug_assert!(std::arch::is_x86_feature_detected!("fma"));
+                    // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
+                    return unsafe { single_avx2::<N>(parts, list, &mut self.wide32) };
+                }
+                Width::Avx512 => {
+                    debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
+                    // SAFETY: this variant exists only where the processor said that it has AVX-512F, VL and FMA.
+                    return unsafe {
+                        if list.kind == Kind::Doubled {
+                            doubled_avx512::<N>(parts, list, &mut self.eight32)
+                        } else {
+                            scouts_avx512::<N>(parts, list, &mut self.sixteen32)
+                        }
+                    };
+                }
+            }
+        }
+        #[cfg(target_arch = "x86_64")]
+        if self.width == Width::Baseline {
+            return run::<f32, 0>(parts, list, &mut self.one32);
+        }
+        debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
+        // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
+        unsafe { one32(parts, list, &mut self.one32) }
+    }
+}
+
+/// Whether games of this size go side by side.
+const fn side_by_side(n: usize) -> bool {
+    0 < n && n <= SIDE_BY_SIDE_UP_TO
+}
+
+/// The problem in single precision: where descents go side by side, twice as many fit a register.
+pub(super) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
+    problem.single.as_ref().filter(|_| side_by_side(N))
 }
 
 /// One descent after another.
@@ -117,80 +183,72 @@ impl Engine {
 /// # Safety
 /// On x86-64 the processor must have AVX2 and FMA.
 #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-unsafe fn run_one<const N: usize>(
-    kind: Kind,
-    problem: &Problem,
-    tasks: &mut Tasks,
-    owners: &[Owner],
-    limits: Limits,
-    means: Means,
-    w: &mut Workspace<f64>,
-) {
-    run::<f64, N>(kind, problem, tasks, owners, limits, means, w);
+unsafe fn one<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<f64>) {
+    run::<f64, N>(parts, list, w);
+}
+
+/// The same in single precision: seldom enough for one version for all sizes.
+///
+/// # Safety
+/// On x86-64 the processor must have AVX2 and FMA.
+#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+unsafe fn one32(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<f32>) {
+    run::<f32, 0>(parts, list, w);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn run_avx2<const N: usize>(
-    kind: Kind,
-    problem: &Problem,
-    tasks: &mut Tasks,
-    owners: &[Owner],
-    limits: Limits,
-    means: Means,
-    w: &mut Workspace<Wide>,
-) {
-    run::<Wide, N>(kind, problem, tasks, owners, limits, means, w);
+fn real_avx2<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<Wide>) {
+    descend::<Wide, N>(parts, list, w);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn single_avx2<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Wide32>) {
+    match list.kind {
+        Kind::Doubled => descend_doubled::<Wide32, N>(parts, list, w),
+        _ => descend::<Wide32, N>(parts, list, w),
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,fma")]
-fn run_avx512_real<const N: usize>(
-    kind: Kind,
-    problem: &Problem,
-    tasks: &mut Tasks,
-    owners: &[Owner],
-    limits: Limits,
-    means: Means,
-    w: &mut Workspace<Eight>,
-) {
-    // So that the compiler makes no version of eight doubled gains.
-    let kind = if kind == Kind::Certified { Kind::Certified } else { Kind::Real };
-    run::<Eight, N>(kind, problem, tasks, owners, limits, means, w);
+fn real_avx512<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<Eight>) {
+    descend::<Eight, N>(parts, list, w);
 }
 
-/// Four at a time: the Hessian of eight would not stay in the first cache.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,fma")]
-fn run_avx512_doubled<const N: usize>(
-    problem: &Problem,
-    tasks: &mut Tasks,
-    owners: &[Owner],
-    limits: Limits,
-    means: Means,
-    w: &mut Workspace<Four>,
-) {
-    run::<Four, N>(Kind::Doubled, problem, tasks, owners, limits, means, w);
+fn scouts_avx512<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Sixteen32>) {
+    descend::<Sixteen32, N>(parts, list, w);
+}
+
+/// Eight at a time: the Hessian of sixteen would not stay in the first cache.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512vl,fma")]
+fn doubled_avx512<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Eight32>) {
+    descend_doubled::<Eight32, N>(parts, list, w);
 }
 
 #[inline(always)]
-fn run<T: Number, const N: usize>(
-    kind: Kind,
-    problem: &Problem,
-    tasks: &mut Tasks,
-    owners: &[Owner],
-    limits: Limits,
-    means: Means,
-    w: &mut Workspace<T>,
-) {
-    if kind == Kind::Doubled {
-        minimise(&mut Doubled::<T, N>::new(problem), tasks, owners, limits, means, w);
-        return;
+fn run<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    match list.kind {
+        Kind::Doubled => descend_doubled::<T, N>(parts, list, w),
+        _ => descend::<T, N>(parts, list, w),
     }
-    let mut real = RealGains::<T, N>::new(problem);
-    minimise(&mut real, tasks, owners, limits, means, w);
-    if kind == Kind::Certified {
-        certify(&mut real, tasks, owners, means, w);
+}
+
+#[inline(always)]
+fn descend_doubled<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    minimise(&mut Doubled::<T, N>::new(parts), list.tasks, list.owners, list.limits, list.means, w);
+}
+
+#[inline(always)]
+fn descend<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    let mut real = RealGains::<T, N>::new(parts);
+    minimise(&mut real, list.tasks, list.owners, list.limits, list.means, w);
+    if !T::SINGLE && list.kind == Kind::Certified {
+        certify(&mut real, list.tasks, list.owners, list.means, w);
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) struct Layout<T: Number> {
     used: usize,
     copies: usize,
     /// By position in the gains: the lanes that have it as a variable, those in which it is relative, and its row's own.
-    seen: Vec<(u8, u8, usize)>,
+    seen: Vec<(u16, u16, usize)>,
 }
 
 impl<T: Number> Default for Layout<T> {
@@ -62,7 +62,7 @@ impl<T: Number> Layout<T> {
     /// Gives a lane its variables. What follows holds once the slots are [listed](Self::list).
     #[inline(always)]
     pub(super) fn place(&mut self, lane: usize, variables: &[Variable]) {
-        let bit = 1u8 << lane;
+        let bit = 1u16 << lane;
         for seen in &mut self.seen {
             seen.0 &= !bit;
             seen.1 &= !bit;

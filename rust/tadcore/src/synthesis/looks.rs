@@ -14,7 +14,7 @@
 //! point before its stage, so no network's answer depends on which others were asked for. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
 
-use super::engine::{Engine, Kind};
+use super::engine::{self, Engine, Kind};
 use super::problem::Problem;
 use super::start::{self, Variable};
 use super::tasks::{Limits, Owner, Reached, Rival, Tasks};
@@ -41,6 +41,9 @@ const LONGEST_STEP: f64 = 0.3;
 const BASIN: f64 = 1e-4;
 /// Steps of a second or third look.
 const LOOK_ITERATIONS: usize = 300;
+/// Steps of a descent in single precision, and the relative gradient at which it is left undecided.
+const SCOUT_ITERATIONS: usize = 60;
+const FLAT: f64 = 1e-6;
 /// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
 const PAIRS_UP_TO: usize = 8;
 /// Rounds of reversals, each from the best point of the one before.
@@ -142,7 +145,7 @@ impl Search<'_> {
     /// Everything beyond the first descent, for the entries `open`.
     fn look_further<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) {
         let looks = self.double::<N>(entries, open);
-        self.finish::<N>(entries, &looks);
+        self.finish::<N>(entries, looks);
         let mut lower = open.to_vec();
         for _ in 0..ROUNDS {
             self.start(1);
@@ -150,7 +153,7 @@ impl Search<'_> {
                 self.reverse(e, &entries[e].g);
             }
             let looks = vec![Look::Reversed; self.tasks.len()];
-            lower = self.finish::<N>(entries, &looks);
+            lower = self.finish::<N>(entries, looks);
             if lower.is_empty() {
                 break;
             }
@@ -197,7 +200,7 @@ impl Search<'_> {
     /// Descends in doubled gains, and lists the starts that come of it and those without one row: the look of each.
     fn double<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
         let (n, m) = (self.problem.size, self.problem.rows);
-        let scale = self.problem.scale.fne;
+        let scale = self.problem.double.scale.fne;
         self.start(2);
         for &e in open {
             for complex in [true, false] {
@@ -221,9 +224,11 @@ impl Search<'_> {
             let (a, b) = doubled.point(task).split_at(m * n);
             let signs = if norm(b) <= BACK * norm(a) { &[0.0][..] } else { &[0.0, 1.0, -1.0] };
             for &sign in signs {
-                for (x, (a, b)) in self.tasks.add(e, false, 0.0).iter_mut().zip(a.iter().zip(b)) {
+                let point = self.tasks.add(e, false, 0.0);
+                for (x, (a, b)) in point.iter_mut().zip(a.iter().zip(b)) {
                     *x = a + sign * b;
                 }
+                start::balance(point, &entries[e].variables);
                 looks.push(look);
             }
             if look == Look::Stacked {
@@ -237,12 +242,45 @@ impl Search<'_> {
         looks
     }
 
+    /// Drops the listed descents of which single precision already shows that they lead back to the best point or cannot
+    /// get below it; the rest goes on from where it got.
+    fn scout<const N: usize>(&mut self, entries: &mut [Entry], looks: &mut Vec<Look>) {
+        let (width, tasks, scouts) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
+        scouts.clear(width, 1);
+        for task in (0..tasks.len()).filter(|&task| entries[tasks.owner(task)].quick) {
+            scouts.add(tasks.owner(task), false, 0.0).copy_from_slice(tasks.point(task));
+        }
+        let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
+        let limits = Limits { iterations: SCOUT_ITERATIONS, tolerance: FLAT, acceptable: FLAT, ..self.limits };
+        self.engine.run::<N>(Kind::Scout, self.problem, scouts, &owners, limits);
+        let mut scout = 0..scouts.len();
+        let keep: Vec<bool> = (0..tasks.len())
+            .map(|task| {
+                let entry = &mut entries[tasks.owner(task)];
+                let Some(scout) = entry.quick.then(|| scout.next()).flatten() else {
+                    return true;
+                };
+                entry.iterations += scouts.reached(scout).iterations;
+                let point = tasks.point_mut(task);
+                point.copy_from_slice(scouts.point(scout));
+                start::balance(point, &entry.variables);
+                !scouts.settled(scout)
+            })
+            .collect();
+        tasks.retain(&keep);
+        let mut keep = keep.iter();
+        looks.retain(|_| *keep.next().unwrap_or(&true));
+    }
+
     /// Makes the listed descents and keeps what is lower; which entries that changed.
-    fn finish<const N: usize>(&mut self, entries: &mut [Entry], looks: &[Look]) -> Vec<usize> {
+    fn finish<const N: usize>(&mut self, entries: &mut [Entry], mut looks: Vec<Look>) -> Vec<usize> {
+        if engine::single::<N>(self.problem).is_some() {
+            self.scout::<N>(entries, &mut looks);
+        }
         let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
         self.engine.run::<N>(Kind::Real, self.problem, self.tasks, &owners, self.limits);
         let mut lower = Vec::new();
-        for (task, &look) in looks.iter().enumerate() {
+        for (task, look) in looks.into_iter().enumerate() {
             let e = self.tasks.owner(task);
             if entries[e].offer(look, self.tasks.point(task), self.tasks.reached(task)) && lower.last() != Some(&e) {
                 lower.push(e);

@@ -27,6 +27,7 @@ mod layout;
 pub mod looks;
 mod newton;
 mod objective;
+mod parts;
 mod problem;
 mod start;
 mod tasks;

@@ -40,6 +40,9 @@ const REST: f64 = 100.0;
 /// How fast predictions fall, from one step to the next, once Newton converges quadratically; in a narrow valley they
 /// fall slowly for hundreds of steps, and what they add up to cannot be foretold.
 const FALLING: f64 = 0.1;
+/// Rounding of Θ, relative to the parts that cancel in it, in double and in single precision.
+const NOISE: f64 = 1e-15;
+const NOISE_SINGLE: f64 = 5e-7;
 /// Damping tried per iteration before giving up.
 const DAMPINGS: f64 = 80.0;
 /// First damping, relative to the largest diagonal entry of the Hessian.
@@ -63,6 +66,12 @@ struct State<T> {
     expected: T,
     rival: T,
     near: T,
+}
+
+/// How far rounding may be in a value, the parts that cancel in it being of size `scale`.
+#[inline(always)]
+fn rounding<T: Number>(value: T, scale: T) -> T {
+    T::splat(if T::SINGLE { NOISE_SINGLE } else { NOISE }) * (value + (value * scale).sqrt())
 }
 
 /// Descends from every point of `tasks` along the variables of its owner, and leaves each end point in its place.
@@ -94,10 +103,10 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         near: zero,
     };
     layout.begin(tasks.width(), width / tasks.width().max(1));
-    let mut task = [0; 8];
+    let mut task = [0; 16];
     let (mut next, mut largest, mut stale) = (0, zero, true);
     // Lanes that work; that have a new point, not yet evaluated; whose last step kept its promise; that have a rival.
-    let (mut busy, mut fresh, mut trusted, mut rivals) = (0u8, 0u8, 0u8, 0u8);
+    let (mut busy, mut fresh, mut trusted, mut rivals) = (0u16, 0u16, 0u16, 0u16);
     loop {
         let mut changed = false;
         for lane in 0..T::LANES {
@@ -137,7 +146,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         let (gradient, step, w_step) = (&mut gradient[..d], &mut step[..d], &mut other[..d]);
         let (hessian, factor) = (&mut hessian[..packed(d)], &mut factor[..d * d]);
         let old = busy & !fresh;
-        let (mut moved, mut failed, mut ended) = (0, 0, 0);
+        let (mut moved, mut failed, mut ended, mut settled) = (0, 0, 0, 0);
         let (mut noise, mut predicted, mut raise) = (zero, zero, zero);
         if old != 0 {
             if stale {
@@ -147,10 +156,8 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 largest = layout.largest(hessian);
                 stale = false;
             }
-            noise = T::splat(1e-15) * (s.value + (s.value * noise_scale).sqrt());
-            raise = (T::splat(4.0) * s.damping)
-                .or_larger(T::splat(FIRST_DAMPING) * largest)
-                .or_larger(T::splat(f64::MIN_POSITIVE));
+            noise = rounding(s.value, noise_scale);
+            raise = (T::splat(4.0) * s.damping).or_larger(T::splat(FIRST_DAMPING) * largest).or_larger(T::least());
             let (definite, lack) = dense::factorise(hessian, s.damping, layout, means, factor);
             let definite = T::bits(definite) & old;
             failed = old & !definite;
@@ -175,16 +182,18 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                     let better = s.damping + length2 / slope * excess;
                     let least = (T::splat(LEAST_RAISE) * s.damping)
                         .or_larger(T::splat(FIRST_DAMPING * FIRST_DAMPING) * largest)
-                        .or_larger(T::splat(f64::MIN_POSITIVE));
+                        .or_larger(T::least());
                     raise = T::select(T::mask(long), least.or_larger(better), raise);
                 }
                 failed |= long;
                 predicted = T::splat(-0.5) * (dot_in_order(step, gradient) - s.damping * length2);
-                let rest = s.value - T::splat(REST) * predicted;
+                let margin = if T::SINGLE { noise } else { zero };
+                let rest = s.value - T::splat(REST) * predicted - margin;
                 let hopeless = T::bits(s.damping.at_most(zero))
                     & T::bits(predicted.less(T::splat(FALLING) * s.expected))
                     & T::bits(s.rival.less(rest));
                 ended = definite & short & rivals & trusted & hopeless;
+                settled = ended;
                 moved = definite & short & !ended;
             }
         }
@@ -233,7 +242,9 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 for (&a, &b) in g.iter().zip(rival.iter()) {
                     distance = distance.plus(a - b, a - b);
                 }
-                let back = T::bits(s.rival.at_most(s.value)) & T::bits(distance.at_most(s.near));
+                // Near its rival a value in single precision does not say which is lower.
+                let above = if T::SINGLE { u16::MAX } else { T::bits(s.rival.at_most(s.value)) };
+                let back = above & T::bits(distance.at_most(s.near));
                 let flat = T::bits(s.slope.at_most(T::splat(limits.tolerance) * s.scale));
                 let spent = T::bits(T::splat(limits.iterations as f64).at_most(s.iterations));
                 ended |= taken & (flat | spent | rivals & back);
@@ -254,6 +265,11 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         }
         fresh = 0;
         busy &= !ended;
+        if T::SINGLE && ended != 0 {
+            // Nor can steps that rounding hides lead below a rival that lies so much lower.
+            let hidden = T::splat(REST * REST) * rounding(s.value, noise_scale);
+            settled |= ended & rivals & T::bits((s.rival + hidden).less(s.value));
+        }
         while ended != 0 {
             let lane = ended.trailing_zeros() as usize;
             ended &= ended - 1;
@@ -263,7 +279,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             layout.place(lane, &[]);
             let (iterations, scale) = (s.iterations.lane(lane) as usize, s.scale.lane(lane));
             let reached = Reached::new(s.value.lane(lane), s.slope.lane(lane), scale, iterations, &limits);
-            tasks.end(task[lane], reached);
+            tasks.end(task[lane], reached, settled >> lane & 1 == 1);
         }
     }
 }

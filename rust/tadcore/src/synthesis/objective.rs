@@ -14,12 +14,12 @@
 
 use super::layout::{Form, Slot};
 use super::newton::Objective;
-use super::problem::Problem;
-use crate::lanes::{Number, dot, norm, sum_of_squares, take};
+use super::parts::Parts;
+use crate::lanes::{Number, Scalar, dot, norm, sum_of_squares, take};
 
 /// Θ over gains, for one network or several side by side. `N` is the size, 0 when it is known only at run time.
-pub(super) struct RealGains<'a, T, const N: usize> {
-    problem: &'a Problem,
+pub(super) struct RealGains<'a, T: Number, const N: usize> {
+    problem: &'a Parts<T::Scalar>,
     /// X at the point last evaluated, N × N.
     x: Vec<T>,
     /// X at the point kept for the Hessian.
@@ -34,7 +34,7 @@ pub(super) struct RealGains<'a, T, const N: usize> {
 
 impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
     #[inline(always)]
-    pub(super) fn new(problem: &'a Problem) -> Self {
+    pub(super) fn new(problem: &'a Parts<T::Scalar>) -> Self {
         let (n, m) = (problem.size, problem.rows);
         let zero = T::splat(0.0);
         Self {
@@ -63,14 +63,14 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
         let (q, own) = (&p.quadratic[0][v.entry * width..][..end], &p.quadratic[0][v.own * width..][..end]);
         let blocks = q.chunks_exact(n).zip(own.chunks_exact(n)).zip(out.chunks_exact_mut(n));
         let players = g.chunks_exact(n).zip(&p.r).zip(&self.gram[i * m..]);
-        let strength = 4.0 * p.gamma[0] * p.r[i];
+        let strength = T::all(p.strength[i]);
         for (j, (((q, own), h), ((gj, &r), &gram))) in blocks.zip(players).enumerate() {
             constant(h, q, own, v);
             if j == i {
-                add_row(h, T::splat(strength), x, n, a, i, v);
+                add_row(h, strength, x, n, a, i, v);
             }
             if GAUSS_NEWTON {
-                let scale = T::splat(strength * r) * along(gj, a, i, v);
+                let scale = strength * T::all(r) * along(gj, a, i, v);
                 for b in 0..n {
                     h[b] = h[b].plus(scale, gi[b]);
                 }
@@ -82,14 +82,14 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
 
 /// h := q − relative·own, rows of a constant matrix.
 #[inline(always)]
-pub(super) fn constant<T: Number>(h: &mut [T], q: &[f64], own: &[f64], v: &Slot<T>) {
+pub(super) fn constant<T: Number>(h: &mut [T], q: &[T::Scalar], own: &[T::Scalar], v: &Slot<T>) {
     if v.differs {
         for ((h, &q), &own) in h.iter_mut().zip(q).zip(own) {
-            *h = T::splat(q).minus(v.relative, T::splat(own));
+            *h = T::all(q).minus(v.relative, T::all(own));
         }
     } else {
         for (h, &q) in h.iter_mut().zip(q) {
-            *h = T::splat(q);
+            *h = T::all(q);
         }
     }
 }
@@ -127,7 +127,7 @@ impl<T: Number, const N: usize> Form<T> for RealGains<'_, T, N> {
 }
 
 /// The form whose definiteness certifies the point last evaluated: its blocks are 4γ₁ δ_ij r_i X + Q_ij.
-pub(super) struct Certificate<'a, 'b, T, const N: usize>(pub &'a RealGains<'b, T, N>);
+pub(super) struct Certificate<'a, 'b, T: Number, const N: usize>(pub &'a RealGains<'b, T, N>);
 
 impl<T: Number, const N: usize> Form<T> for Certificate<'_, '_, T, N> {
     #[inline(always)]
@@ -150,21 +150,21 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
         let (fne, g) = (&p.fne[..m * n], &g[..m * n]);
         let (x, delta) = (&mut self.x[..n * n], &mut self.delta[..m * n]);
         for (x, &t) in x.iter_mut().zip(&p.target[..n * n]) {
-            *x = T::splat(-t);
+            *x = T::all(-t);
         }
         let mut rest = T::splat(0.0);
         let rows = g.chunks_exact(n).zip(fne.chunks_exact(n)).zip(delta.chunks_exact_mut(n));
         for (((gi, fi), di), (&r, &closeness)) in rows.zip(p.r.iter().zip(&p.closeness)) {
             for (x, &g) in x.chunks_exact_mut(n).zip(gi) {
-                let factor = T::splat(r) * g;
+                let factor = T::all(r) * g;
                 for b in 0..n {
                     x[b] = x[b].plus(factor, gi[b]);
                 }
             }
             for b in 0..n {
-                di[b] = gi[b] - T::splat(fi[b]);
+                di[b] = gi[b] - T::all(fi[b]);
             }
-            rest = rest.plus(T::splat(closeness), sum_of_squares(di));
+            rest = rest.plus(T::all(closeness), sum_of_squares(di));
         }
         let quartic = sum_of_squares(x);
         for (group, w) in p.coupling.iter().enumerate() {
@@ -172,7 +172,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
             symmetric_product(e, n, &w[..m * n], delta, T::splat(1.0));
             rest = rest + sum_of_squares(e);
         }
-        rest.plus(T::splat(p.gamma[0]), quartic)
+        rest.plus(T::all(p.first), quartic)
     }
 
     #[inline(always)]
@@ -182,11 +182,11 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
         let x = &self.x[..n * n];
         let rows = g[..m * n].chunks_exact(n).zip(self.delta.chunks_exact(n)).zip(out.chunks_exact_mut(n));
         for (i, ((gi, di), y)) in rows.enumerate() {
-            let c = T::splat(2.0 * p.closeness[i]);
+            let c = T::splat(2.0) * T::all(p.closeness[i]);
             for b in 0..n {
                 y[b] = c * di[b];
             }
-            add_product(y, n, T::splat(4.0 * p.gamma[0] * p.r[i]), gi, x);
+            add_product(y, n, T::all(p.strength[i]), gi, x);
             for (w, e) in p.coupling.iter().zip(self.coupled.chunks_exact(n * n)) {
                 add_weighted(y, n, &w[i * n..(i + 1) * n], e);
             }
@@ -204,7 +204,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
         let (n, m) = self.dimensions();
         for i in 0..m {
             for j in 0..i + 1 {
-                let factor = T::splat(4.0 * p.gamma[0] * p.r[i] * p.r[j]);
+                let factor = T::all(p.strength[i]) * T::all(p.r[j]);
                 self.gram[i * m + j] = factor * dot(&g[i * n..][..n], &g[j * n..][..n]);
             }
         }
@@ -213,23 +213,23 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
     #[inline(always)]
     fn gradient_scale(&self, g: &[T]) -> T {
         let (s, size) = (&self.problem.scale, norm(g));
-        let quartic = T::splat(4.0 * self.problem.gamma[0] * s.weight) * size;
+        let quartic = T::splat(s.quartic) * size;
         quartic * (norm(&self.x) + T::splat(2.0 * s.target))
             + T::splat(8.0 * s.coupling + 2.0 * s.closeness) * (size + T::splat(s.fne))
     }
 
     #[inline(always)]
     fn value_scale(&self) -> f64 {
-        self.problem.value_scale()
+        self.problem.scale.value
     }
 }
 
 /// E = WΔ + σ(WΔ)ᵀ, with w and Δ by rows.
 #[inline(always)]
-pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[f64], delta: &[T], sign: T) {
+pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[T::Scalar], delta: &[T], sign: T) {
     for (i, (w, d)) in w.chunks_exact(n).zip(delta.chunks_exact(n)).enumerate() {
         for (e, &w) in e.chunks_exact_mut(n).zip(w) {
-            let factor = T::splat(w);
+            let factor = T::all(w);
             for b in 0..n {
                 e[b] = if i == 0 { factor * d[b] } else { e[b].plus(factor, d[b]) };
             }
@@ -257,9 +257,9 @@ pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T]
 
 /// row += 4 · (w E) for a row w of the problem.
 #[inline(always)]
-pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[f64], e: &[T]) {
+pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[T::Scalar], e: &[T]) {
     for (e, &w) in e.chunks_exact(n).zip(w) {
-        let scale = T::splat(4.0 * w);
+        let scale = T::all(T::Scalar::of(4.0) * w);
         for b in 0..n {
             row[b] = row[b].plus(scale, e[b]);
         }

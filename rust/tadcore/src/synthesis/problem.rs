@@ -11,6 +11,7 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
+use super::parts::{Parts, Scale};
 use crate::game::{Game, Interaction};
 use crate::lanes::{norm, sum_of_squares};
 
@@ -21,33 +22,10 @@ pub struct Problem {
     pub(super) size: usize,
     pub(super) rows: usize,
     pub(super) gamma: Vec<f64>,
-    pub(super) r: Vec<f64>,
-    pub(super) fne: Vec<f64>,
-    pub(super) target: Vec<f64>,
-    pub(super) coupling: Vec<Vec<f64>>,
-    /// Σ_p W_pᵀW_p, m × m.
-    pub(super) coupling_gram: Vec<f64>,
-    /// c_i.
-    pub(super) closeness: Vec<f64>,
-    /// The Hessian's constant part 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** with + and with −, mN × mN;
-    /// blocks on and below the diagonal.
-    pub(super) quadratic: [Vec<f64>; 2],
-    pub(super) scale: Scale,
-}
-
-/// Norms that say how large the cancelling parts of Θ and its gradient are.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Scale {
-    /// ‖F‖.
-    pub fne: f64,
-    /// ‖M‖.
-    pub target: f64,
-    /// Σ_p ‖W_p‖².
-    pub coupling: f64,
-    /// The largest c_i.
-    pub closeness: f64,
-    /// The largest r_i.
-    pub weight: f64,
+    /// What Θ is made of.
+    pub(super) double: Parts<f64>,
+    /// The same in single precision, where that can hold it.
+    pub(super) single: Option<Parts<f32>>,
 }
 
 impl Problem {
@@ -107,20 +85,22 @@ impl Problem {
             .collect();
         let quadratic = [1.0, -1.0].map(|sign| constant(size, sign, &coupling, &coupling_gram, &closeness));
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let (size_of_f, size_of_m) = (norm(&fne), norm(&target));
+        let of_w: f64 = coupling.iter().map(|w| sum_of_squares(w)).sum();
+        let of_c = largest(&closeness);
         let scale = Scale {
-            fne: norm(&fne),
-            target: norm(&target),
-            coupling: coupling.iter().map(|w| sum_of_squares(w)).sum(),
-            closeness: largest(&closeness),
-            weight: largest(&r),
+            fne: size_of_f,
+            target: size_of_m,
+            coupling: of_w,
+            closeness: of_c,
+            quartic: 4.0 * gamma[0] * largest(&r),
+            value: gamma[0] * size_of_m * size_of_m + (4.0 * of_w + of_c) * size_of_f * size_of_f,
         };
-        Self { interaction, size, rows, gamma, r, fne, target, coupling, coupling_gram, closeness, quadratic, scale }
-    }
-
-    /// Size of the parts of Θ: what its rounding is relative to.
-    pub(super) fn value_scale(&self) -> f64 {
-        let s = &self.scale;
-        self.gamma[0] * s.target * s.target + (4.0 * s.coupling + s.closeness) * s.fne * s.fne
+        let strength = r.iter().map(|r| 4.0 * gamma[0] * r).collect();
+        let first = gamma[0];
+        let double = Parts { size, rows, first, strength, r, fne, target, coupling, closeness, quadratic, scale };
+        let single = double.in_range().then(|| double.rounded());
+        Self { interaction, size, rows, gamma, double, single }
     }
 
     /// N.
@@ -138,23 +118,23 @@ impl Problem {
     /// The FNE rows F, m × N.
     #[must_use]
     pub fn fne(&self) -> &[f64] {
-        &self.fne
+        &self.double.fne
     }
 
     /// The squared residual norms of the gain rows `g`, unweighted and reduced, in the order of γ:
     /// ‖ΔQ_d‖², ‖ΔQ_τ‖², ‖ΔQ_a‖², ‖S₁‖² in I1 (`p`: the Riccati matrices of the instant) and ‖ΔQ‖², ‖S₂‖², ‖S₃‖² in I2.
     #[must_use]
     pub fn terms(&self, p: &[f64], g: &[f64]) -> Vec<f64> {
-        let (n, m) = (self.size, self.rows);
-        let delta: Vec<f64> = g.iter().zip(&self.fne).map(|(g, f)| g - f).collect();
+        let (n, m, of) = (self.size, self.rows, &self.double);
+        let delta: Vec<f64> = g.iter().zip(&of.fne).map(|(g, f)| g - f).collect();
         let closeness = |rows: std::ops::Range<usize>| -> f64 {
-            rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (self.r[i] * d).powi(2))).sum()
+            rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (of.r[i] * d).powi(2))).sum()
         };
         let mut quadratic = 0.0;
         for a in 0..n {
             for b in 0..n {
-                let gain: f64 = (0..m).map(|i| self.r[i] * g[i * n + a] * g[i * n + b]).sum();
-                quadratic += (gain - self.target[a * n + b]).powi(2);
+                let gain: f64 = (0..m).map(|i| of.r[i] * g[i * n + a] * g[i * n + b]).sum();
+                quadratic += (gain - of.target[a * n + b]).powi(2);
             }
         }
         match self.interaction {

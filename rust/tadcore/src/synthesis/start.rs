@@ -56,7 +56,7 @@ pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
     for i in 0..problem.rows {
         let relative = !topology.sees_attacker(i);
         let used = |j: usize| j == i || topology.sees(i, j);
-        let row = &problem.fne[i * n..(i + 1) * n];
+        let row = &problem.double.fne[i * n..(i + 1) * n];
         let (mut sum, mut count) = (0.0, 0.0);
         for j in (0..n).filter(|&j| used(j)) {
             sum += row[j];
@@ -69,6 +69,13 @@ pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
         if relative && count == 1.0 {
             g[i * n + i] = 0.0;
         }
+    }
+}
+
+/// Makes the rows that know differences only sum to zero again, which rounding in single precision does not.
+pub(super) fn balance(g: &mut [f64], variables: &[Variable]) {
+    for row in variables.chunk_by(|a, b| a.own == b.own).filter(|row| row[0].relative) {
+        g[row[0].own] = -row.iter().map(|v| g[v.entry]).sum::<f64>();
     }
 }
 

@@ -89,6 +89,8 @@ pub(super) struct Tasks {
     whose: Vec<(usize, bool, f64)>,
     reached: Vec<Reached>,
     certified: Vec<bool>,
+    /// Whether a descent ended because of its rival.
+    settled: Vec<bool>,
 }
 
 impl Tasks {
@@ -99,6 +101,7 @@ impl Tasks {
         self.whose.clear();
         self.reached.clear();
         self.certified.clear();
+        self.settled.clear();
     }
 
     /// Adds a descent of `owner`'s, and gives its start to be written.
@@ -108,6 +111,7 @@ impl Tasks {
         self.whose.push((owner, complex, scale));
         self.reached.push(Reached::default());
         self.certified.push(false);
+        self.settled.push(false);
         &mut self.points[from..]
     }
 
@@ -136,8 +140,27 @@ impl Tasks {
         &mut self.points[task * self.length..][..self.length]
     }
 
-    pub(super) fn end(&mut self, task: usize, reached: Reached) {
-        self.reached[task] = reached;
+    pub(super) fn end(&mut self, task: usize, reached: Reached, settled: bool) {
+        (self.reached[task], self.settled[task]) = (reached, settled);
+    }
+
+    pub(super) fn settled(&self, task: usize) -> bool {
+        self.settled[task]
+    }
+
+    /// Drops the descents that `keep` does not name; none of them has been made.
+    pub(super) fn retain(&mut self, keep: &[bool]) {
+        let mut kept = 0;
+        for task in (0..keep.len()).filter(|&task| keep[task]) {
+            self.whose[kept] = self.whose[task];
+            self.points.copy_within(task * self.length..(task + 1) * self.length, kept * self.length);
+            kept += 1;
+        }
+        self.points.truncate(kept * self.length);
+        self.whose.truncate(kept);
+        self.reached.truncate(kept);
+        self.certified.truncate(kept);
+        self.settled.truncate(kept);
     }
 
     pub(super) fn reached(&self, task: usize) -> Reached {

@@ -49,7 +49,7 @@ pub(super) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, mean
         } else {
             factorise_alone(h, damping, used, d, means.width, f)
         };
-        return (T::mask(u8::from(definite)), T::splat(lack));
+        return (T::mask(u16::from(definite)), T::splat(lack));
     }
     let mut pivots = Pivots::new();
     for first in (0..d).step_by(GROUP) {
@@ -172,7 +172,7 @@ fn tile<T: Number>(h: &[T], row: usize, column: usize, damping: T, f: &[T], d: u
 /// What the pivots said so far.
 struct Pivots<T> {
     /// The lanes whose pivots were all sound.
-    ok: u8,
+    ok: u16,
     /// The first that was not, its sign turned.
     lack: T,
 }
@@ -180,15 +180,14 @@ struct Pivots<T> {
 impl<T: Number> Pivots<T> {
     #[inline(always)]
     fn new() -> Self {
-        Self { ok: u8::MAX, lack: T::splat(0.0) }
+        Self { ok: u16::MAX, lack: T::splat(0.0) }
     }
 
     /// The pivot to divide by: one where there is no unknown or the matrix is refused, whose lane goes on with the others
     /// and is not used. A pivot is sound unless it is lost in the rounding of the diagonal entry that it comes from.
     #[inline(always)]
     fn check(&mut self, pivot: T, original: T, active: T::Mask) -> T {
-        let sound =
-            T::bits((T::splat(f64::EPSILON) * original.abs()).less(pivot)) & T::bits(T::splat(0.0).less(original));
+        let sound = T::bits((T::epsilon() * original.abs()).less(pivot)) & T::bits(T::splat(0.0).less(original));
         let active = T::bits(active);
         let refused = active & !sound;
         self.lack = T::select(T::mask(self.ok & refused), T::splat(0.0) - pivot, self.lack);

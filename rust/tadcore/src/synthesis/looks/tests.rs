@@ -14,7 +14,7 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
     let entry = Entry::new(start::variables(topology), canonical);
     let owners = [Owner { variables: &entry.variables, rival: None }];
     let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
-    let scale = problem.scale.fne;
+    let scale = problem.double.scale.fne;
     tasks.clear(entry.start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(&entry.start);
     engine.run::<0>(Kind::Real, problem, tasks, &owners, fine);

@@ -1,0 +1,76 @@
+//! What Θ is made of, in the precision of a kernel.
+
+use crate::lanes::Scalar;
+
+/// The numbers of one instant: the symbols of [`super::problem`].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Parts<S> {
+    /// N.
+    pub size: usize,
+    /// m.
+    pub rows: usize,
+    /// γ₁.
+    pub first: S,
+    /// 4γ₁r_i.
+    pub strength: Vec<S>,
+    pub r: Vec<S>,
+    /// F.
+    pub fne: Vec<S>,
+    /// M.
+    pub target: Vec<S>,
+    /// W_p.
+    pub coupling: Vec<Vec<S>>,
+    /// c_i.
+    pub closeness: Vec<S>,
+    /// The Hessian's constant part 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** with + and with −, mN × mN;
+    /// blocks on and below the diagonal.
+    pub quadratic: [Vec<S>; 2],
+    pub scale: Scale,
+}
+
+/// Norms that say how large the cancelling parts of Θ and its gradient are.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scale {
+    /// ‖F‖.
+    pub fne: f64,
+    /// ‖M‖.
+    pub target: f64,
+    /// Σ_p ‖W_p‖².
+    pub coupling: f64,
+    /// The largest c_i.
+    pub closeness: f64,
+    /// 4γ₁ and the largest r_i.
+    pub quartic: f64,
+    /// Size of the parts of Θ: what its rounding is relative to.
+    pub value: f64,
+}
+
+/// Sizes between which sums of squares and their roundings are numbers of single precision.
+const RANGE: (f64, f64) = (1e-9, 1e12);
+
+impl Parts<f64> {
+    /// Whether Θ and gains of the size of F, their gradients and curvatures lie well within single precision.
+    pub(super) fn in_range(&self) -> bool {
+        let within = |x: f64| RANGE.0 <= x && x <= RANGE.1;
+        let (s, value) = (&self.scale, self.scale.value);
+        within(value) && within(s.fne * s.fne) && within(value / (s.fne * s.fne))
+    }
+
+    /// Every number rounded.
+    pub(super) fn rounded(&self) -> Parts<f32> {
+        let all = |numbers: &[f64]| numbers.iter().map(|&x| f32::of(x)).collect();
+        Parts {
+            size: self.size,
+            rows: self.rows,
+            first: f32::of(self.first),
+            strength: all(&self.strength),
+            r: all(&self.r),
+            fne: all(&self.fne),
+            target: all(&self.target),
+            coupling: self.coupling.iter().map(|w| all(w)).collect(),
+            closeness: all(&self.closeness),
+            quadratic: [all(&self.quadratic[0]), all(&self.quadratic[1])],
+            scale: self.scale.clone(),
+        }
+    }
+}
