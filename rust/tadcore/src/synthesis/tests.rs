@@ -10,6 +10,7 @@ use crate::game::Interaction;
 use crate::width::Width;
 
 mod descents;
+mod single;
 
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
     let width = objective.width();

@@ -9,8 +9,9 @@ use super::super::workspace::Workspace;
 use super::*;
 use crate::lanes::norm;
 
-const MEANS: Means = Means { library: false, width: Width::Baseline };
-const LIMITS: Limits = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
+pub(super) const MEANS: Means = Means { library: false, width: Width::Baseline };
+pub(super) const LIMITS: Limits =
+    Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
 
 /// ½ Σ h_i g_i² + Σ b_i g_i + a number that keeps it positive.
 struct Quadratic {
@@ -55,7 +56,7 @@ impl Objective<f64> for Quadratic {
 }
 
 /// Where a descent from `start` along `variables` ends, and what it says of that.
-fn descend(
+pub(super) fn descend(
     objective: &mut impl Objective<f64>,
     start: &[f64],
     variables: &[Variable],
@@ -103,7 +104,7 @@ fn an_indefinite_matrix_is_damped_by_what_its_pivot_lacks() {
 }
 
 /// Networks at both interactions' samples: all that a descent of one of them needs.
-fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
+pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, _, _) = sample(interaction);
         let (m, n) = (problem.rows(), problem.size());

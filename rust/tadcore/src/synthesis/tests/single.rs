@@ -1,0 +1,82 @@
+//! Looks in single precision: what they leave out must be nothing, and what they cannot decide is decided in double.
+
+use super::super::newton::minimise;
+use super::super::tasks::{Owner, Rival};
+use super::super::workspace::Workspace;
+use super::descents::{LIMITS, MEANS, descend, each};
+use super::*;
+use crate::lanes::norm;
+
+/// Whether single precision settles a descent from `start` beside a rival.
+fn settled(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival) -> bool {
+    let parts = problem.single.as_ref().expect("a problem in range");
+    let mut tasks = Tasks::default();
+    tasks.clear(start.len(), 1);
+    tasks.add(0, false, 0.0).copy_from_slice(start);
+    let owners = [Owner { variables, rival: Some(rival) }];
+    let limits = Limits { tolerance: 1e-6, ..LIMITS };
+    minimise(&mut RealGains::<f32, 0>::new(parts), &mut tasks, &owners, limits, MEANS, &mut Workspace::default());
+    tasks.settled(0)
+}
+
+/// Of a descent that ends below its rival, by however little, nothing is settled; nor of one that ends near it, where
+/// rounding hides which is lower. Far above its rival every one is.
+#[test]
+fn only_what_cannot_win_is_settled() {
+    let mut count = 0;
+    each(|problem, variables, g| {
+        let (end, reached) = descend(&mut RealGains::<f64, 0>::new(&problem.double), g, variables, None, LIMITS);
+        let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
+        for higher in [1e-9, 1e-6, 1e-3, 0.1] {
+            let rival = Rival { g: &far, value: reached.value * (1.0 + higher), near: 1e-3 };
+            assert!(!settled(problem, variables, g, rival), "{higher}");
+        }
+        let rival = Rival { g: &end, value: reached.value * (1.0 - 1e-9), near: 1e-3 * norm(&end) };
+        assert!(!settled(problem, variables, g, rival));
+        assert!(settled(problem, variables, g, Rival { g: &far, value: -1.0, near: 1e-3 }));
+        count += 1;
+    });
+    assert!(count > 100, "{count}");
+}
+
+/// All weights s times as large leave the gains as they are and make Θ s² times as large. Where Θ leaves the range of
+/// single precision everything is done in double: the same minima.
+#[test]
+fn out_of_range_everything_is_done_in_double() {
+    for interaction in [Interaction::I1, Interaction::I2] {
+        let (problem, p, _) = sample(interaction);
+        assert!(problem.single.is_some());
+        let (m, n) = (problem.rows(), problem.size());
+        let topologies: Vec<Topology> = (0..1u64 << (m * n))
+            .step_by(if m * n > 9 { 29 } else { 3 })
+            .map(|key| Topology::from_key(m, n, key))
+            .collect();
+        let solve = |problem: &Problem| {
+            let mut all = Vec::new();
+            Synthesizer::new().solve_all(problem, &topologies, Options::default(), |_, gains| all.push(gains));
+            all
+        };
+        let within = solve(&problem);
+        // Powers of two, so that no bit but those of the exponents changes.
+        for scale in [2.0_f64.powi(40), 2.0_f64.powi(-40)] {
+            let r = problem.double.r.iter().map(|r| r * scale).collect();
+            let p: Vec<f64> = p.iter().map(|p| p * scale).collect();
+            let scaled = Problem::from_parts(interaction, r, problem.gamma.clone(), &p);
+            assert!(scaled.single.is_none());
+            for ((gains, expected), topology) in solve(&scaled).iter().zip(&within).zip(&topologies) {
+                let theta = gains.theta / (scale * scale);
+                assert!((theta - expected.theta).abs() <= 1e-12 * (1.0 + expected.theta), "{topology:?}");
+                assert_eq!(gains.certified, expected.certified, "{topology:?}");
+            }
+        }
+    }
+}
+
+/// Rows that know differences only sum to zero, those that see the attacker are left alone.
+#[test]
+fn rows_are_balanced() {
+    let topology = Topology::from_words(2, 3, &[0b010_110]);
+    let mut g = vec![9.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+    start::balance(&mut g, &start::variables(&topology));
+    assert_eq!(g, [-5.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+}
