@@ -280,12 +280,14 @@ MUTANTS = {
         ),
         ("the paper's descent: step length", "map(|(s, (n, o))| «s * (n - o)»)", "s * (n + o)"),
     ],
-    "synthesis/looks.rs": [
+    "synthesis/entry.rs": [
         (
             "a look must win",
             "«self.reached.value - TIE * self.reached.value.abs()»",
             "self.reached.value + TIE * self.reached.value.abs()",
         ),
+    ],
+    "synthesis/looks.rs": [
         ("one reversed row", "scale_rows(n, g, &[i], «-1.0»,", "1.0"),
         ("two reversed rows", "scale_rows(n, g, &[i, j], «-1.0»,", "1.0"),
         ("one row left out", "&entries[e].start, &[i], «0.0»,", "1.0"),

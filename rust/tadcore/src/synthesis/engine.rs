@@ -1,4 +1,5 @@
-//! Runs a list of descents as wide as the processor and the list allow: one at a time, or four or eight side by side.
+//! Runs a list of descents as wide as the processor and the list allow: one at a time, or four to sixteen side by side, in
+//! double or in single precision.
 //!
 //! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
 //! leave the first cache side by side, and go one at a time.

@@ -9,29 +9,21 @@
 //! 3. A last look: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG does
 //!    not see the sign of a row, so minima come in families that differ by signs.
 //!
+//! Most descents of the further looks lead back to the best point or to a higher one. Where descents go side by side they are
+//! made in single precision first, twice as many to a register, and only those that this leaves undecided go on in double;
+//! doubled gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
+//!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. The networks of one instant
 //! go through these stages together, their descents side by side; the rival that lets a descent end early is the best
 //! point before its stage, so no network's answer depends on which others were asked for. Everything here is a
 //! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
 
 use super::engine::{self, Engine, Kind};
+use super::entry::{BACK, Entry, Look};
 use super::problem::Problem;
-use super::start::{self, Variable};
-use super::tasks::{Limits, Owner, Reached, Rival, Tasks};
+use super::start;
+use super::tasks::{Limits, Owner, Tasks};
 use crate::lanes::norm;
-
-/// The look that won.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
-    /// Newton from the canonical start.
-    Canonical,
-    /// The second look, in complex gains.
-    Complex,
-    /// The third look, in stacked gains.
-    Stacked,
-    /// The last look, with rows reversed or left out.
-    Reversed,
-}
 
 /// Size of the second part B at the start, relative to ‖F‖.
 const FAR: f64 = 1.0;
@@ -53,63 +45,6 @@ const ROUNDS: usize = 4;
 const QUICK: usize = 30;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
-/// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as
-/// small makes no other points of A + B and A − B.
-const BACK: f64 = 1e-3;
-/// How much lower, relatively, a look must be to win.
-const TIE: f64 = 1e-9;
-
-/// One network at the instant: its variables, and the best gains found so far.
-#[derive(Debug)]
-pub(super) struct Entry {
-    pub variables: Vec<Variable>,
-    start: Vec<f64>,
-    pub g: Vec<f64>,
-    pub reached: Reached,
-    pub look: Look,
-    pub certified: bool,
-    /// Iterations of all descents together.
-    pub iterations: usize,
-    quick: bool,
-}
-
-impl Entry {
-    /// A network that starts from `start`.
-    pub(super) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
-        Self {
-            variables,
-            g: start.clone(),
-            start,
-            reached: Reached::default(),
-            look: Look::Canonical,
-            certified: false,
-            iterations: 0,
-            quick: false,
-        }
-    }
-
-    fn owner(&self) -> Owner<'_> {
-        let rival = Rival { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
-        Owner { variables: &self.variables, rival: self.quick.then_some(rival) }
-    }
-
-    /// Keeps what a descent of `look` reached.
-    fn take(&mut self, look: Look, g: &[f64], reached: Reached) {
-        self.g.copy_from_slice(g);
-        (self.reached, self.look) = (reached, look);
-    }
-
-    /// Keeps what a descent of a further look reached when it is lower; says whether it is.
-    fn offer(&mut self, look: Look, g: &[f64], reached: Reached) -> bool {
-        self.iterations += reached.iterations;
-        let lower = reached.value < self.reached.value - TIE * self.reached.value.abs();
-        if lower {
-            self.take(look, g, reached);
-        }
-        lower
-    }
-}
-
 /// What a search needs besides its entries.
 pub(super) struct Search<'a> {
     pub problem: &'a Problem,

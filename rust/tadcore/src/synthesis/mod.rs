@@ -23,6 +23,7 @@ mod dense;
 mod descent;
 mod doubled;
 mod engine;
+mod entry;
 mod layout;
 pub mod looks;
 mod newton;
@@ -34,13 +35,14 @@ mod tasks;
 mod workspace;
 
 pub(crate) use engine::SIDE_BY_SIDE_UP_TO;
-pub use looks::Look;
+pub use entry::Look;
 pub use problem::Problem;
 pub use tasks::Status;
 
 use crate::network::Topology;
 use engine::Engine;
-use looks::{Entry, Search};
+use entry::Entry;
+use looks::Search;
 use tasks::{Limits, Tasks};
 
 /// How the gains are computed.
