@@ -1,9 +1,10 @@
 //! Players of one kind: topologies that differ by their names alone share one answer.
 //!
-//! Defenders with the same weights may change places. A relabelling of them carries the gains of one topology into those of
-//! another, and the transition with them, so one synthesis serves all. Which one is solved, the *model*, is a function of the
-//! topology alone, whoever asks: defenders of a kind in the order of whom they see, then of colours. Between a topology and its model nothing
-//! is computed, numbers only change their places, so the answer has the same bits on every way there.
+//! Defenders with the same weights may change places. A relabelling of them carries the gains of one topology into those
+//! of another, and the transition with them, so one synthesis serves all. Which one is solved, the *model*, is a
+//! function of the topology alone, whoever asks: defenders of a kind in the order of whom they see, then of colours.
+//! Between a topology and its model nothing is computed, numbers only change their places, so the answer has the same
+//! bits on every way there.
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|

@@ -9,9 +9,9 @@
 //! 3. A last look: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG does
 //!    not see the sign of a row, so minima come in families that differ by signs.
 //!
-//! Most descents of the further looks lead back to the best point or to a higher one. Where descents go side by side they are
-//! made in single precision first, twice as many to a register, and only those that this leaves undecided go on in double;
-//! doubled gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
+//! Most descents of the further looks lead back to the best point or to a higher one. Where descents go side by side
+//! they are made in single precision first, twice as many to a register, and what that leaves undecided goes on in
+//! double from there; doubled gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
 //!
 //! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. The networks of one instant
 //! go through these stages together, their descents side by side; the rival that lets a descent end early is the best
@@ -177,8 +177,8 @@ impl Search<'_> {
         looks
     }
 
-    /// Drops the listed descents of which single precision already shows that they lead back to the best point or cannot
-    /// get below it; the rest goes on from where it got.
+    /// Drops the listed descents of which single precision already shows that they cannot get below the best point; the
+    /// rest goes on from where it got.
     fn scout<const N: usize>(&mut self, entries: &mut [Entry], looks: &mut Vec<Look>) {
         let (width, tasks, scouts) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
         scouts.clear(width, 1);

@@ -89,7 +89,7 @@ pub(super) struct Tasks {
     whose: Vec<(usize, bool, f64)>,
     reached: Vec<Reached>,
     certified: Vec<bool>,
-    /// Whether a descent ended because of its rival.
+    /// Whether a descent ended because it cannot get below its rival.
     settled: Vec<bool>,
 }
 
