@@ -113,13 +113,14 @@ def papers_way(trials: int, best: float) -> tuple[str, ...]:
 
 def main() -> None:
     quick = _side.start(__doc__)
+    # First, before JAX has threads of its own.
+    threaded(50 if quick else 200_000)
     numba = _side.numba_wanted(quick)
     rows = compare("cold", 50 if quick else 1_000, 1 if quick else 3, numba)
     rows += compare("warm", 50 if quick else 20_000, 1 if quick else 9, numba)
     if not quick:
         rows.append(papers_way(3, 1.0 / float(rows[0][1].replace(",", ""))))
     _side.table(("contender", "trials/s", "ratio"), rows)
-    threaded(50 if quick else 200_000)
 
 
 def threaded(trials: int) -> None:
