@@ -101,6 +101,8 @@ class Time:
 
     cpu: float
     wall: float
+    best: float
+    """The least CPU time."""
 
 
 def interleave(contenders: Mapping[str, Callable[[], Any]], repetitions: int) -> tuple[dict[str, Time], dict[str, Any]]:
@@ -117,7 +119,8 @@ def interleave(contenders: Mapping[str, Callable[[], Any]], repetitions: int) ->
             wall, cpu = time.perf_counter(), time.process_time()
             answers[name] = run()
             samples[name].append((time.process_time() - cpu, time.perf_counter() - wall))
-    return {name: Time(*map(float, np.median(s, axis=0))) for name, s in samples.items()}, answers
+    medians = {name: np.median(s, axis=0) for name, s in samples.items()}
+    return {name: Time(*map(float, m), best=min(samples[name])[0]) for name, m in medians.items()}, answers
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
