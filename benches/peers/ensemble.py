@@ -8,8 +8,8 @@ of 4,000. SciPy is the paper's own way, BFGS at every instant (`run.py`): a few 
 
 How to read the table: trials per second of CPU time, the median and the best of interleaved repetitions, each with its
 `ratio`, the speed of tadcore over that of the row. On a shared machine a median tells how much the repetitions were
-disturbed, too, and what keeps wide registers busy is disturbed most. Every outcome, defender and time must be equal, but
-for one trial in a thousand, where a distance meets a radius within rounding.
+disturbed, too, and what keeps wide registers busy is disturbed most. Every outcome, defender and time must be equal,
+but for one trial in a thousand, where a distance meets a radius within rounding.
 """
 
 import importlib.util
