@@ -253,6 +253,7 @@ MUTANTS = {
             "«(s.rival + hidden).less(s.value)»",
             "s.value.less(s.rival + hidden)",
         ),
+        ("single precision: ends that rounding makes", "settled |= «stopped» & rivals", "ended"),
         ("rounding in a value", "(«value + (value * scale).sqrt()»)", "T::splat(0.0)"),
     ],
     "synthesis/tasks.rs": [

@@ -45,13 +45,14 @@ const ROUNDS: usize = 4;
 const QUICK: usize = 30;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
+
 /// What a search needs besides its entries.
 pub(super) struct Search<'a> {
     pub problem: &'a Problem,
     pub limits: Limits,
     pub engine: &'a mut Engine,
     pub tasks: &'a mut Tasks,
-    /// The descents in doubled gains, when they are done.
+    /// A list to spare: descents in doubled gains when they are done, and those in single precision.
     pub doubled: &'a mut Tasks,
 }
 

@@ -146,7 +146,9 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         let (gradient, step, w_step) = (&mut gradient[..d], &mut step[..d], &mut other[..d]);
         let (hessian, factor) = (&mut hessian[..packed(d)], &mut factor[..d * d]);
         let old = busy & !fresh;
-        let (mut moved, mut failed, mut ended, mut settled) = (0, 0, 0, 0);
+        let (mut moved, mut failed, mut ended) = (0, 0, 0);
+        // Of the lanes that ended: those that cannot get below their rival, and those that rounding stopped.
+        let (mut settled, mut stopped) = (0, 0);
         let (mut noise, mut predicted, mut raise) = (zero, zero, zero);
         if old != 0 {
             if stale {
@@ -217,7 +219,8 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             let small = T::bits(predicted.at_most(noise));
             let flatter = T::bits(slope.less(s.slope)) & T::bits((zero - noise).at_most(actual));
             let accepted = moved & (paid | small & flatter);
-            ended |= moved & !accepted & small;
+            stopped = moved & !accepted & small;
+            ended |= stopped;
             failed |= moved & !accepted & !small;
 
             let mut damping = s.damping * T::splat(0.125);
@@ -248,6 +251,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 let flat = T::bits(s.slope.at_most(T::splat(limits.tolerance) * s.scale));
                 let spent = T::bits(T::splat(limits.iterations as f64).at_most(s.iterations));
                 ended |= taken & (flat | spent | rivals & back);
+                stopped |= taken & flat;
                 let going = T::mask(taken & !ended);
                 s.iterations = T::select(going, s.iterations + T::splat(1.0), s.iterations);
                 s.dampings = T::select(going, zero, s.dampings);
@@ -265,10 +269,10 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
         }
         fresh = 0;
         busy &= !ended;
-        if T::SINGLE && ended != 0 {
+        if T::SINGLE && stopped != 0 {
             // Nor can steps that rounding hides lead below a rival that lies so much lower.
             let hidden = T::splat(REST * REST) * rounding(s.value, noise_scale);
-            settled |= ended & rivals & T::bits((s.rival + hidden).less(s.value));
+            settled |= stopped & rivals & T::bits((s.rival + hidden).less(s.value));
         }
         while ended != 0 {
             let lane = ended.trailing_zeros() as usize;

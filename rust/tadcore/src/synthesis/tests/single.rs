@@ -8,13 +8,13 @@ use super::*;
 use crate::lanes::norm;
 
 /// Whether single precision settles a descent from `start` beside a rival, and in how many steps it ends.
-fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival) -> (bool, usize) {
+fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival, iterations: usize) -> (bool, usize) {
     let parts = problem.single.as_ref().expect("a problem in range");
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(start);
     let owners = [Owner { variables, rival: Some(rival) }];
-    let limits = Limits { tolerance: 1e-6, ..LIMITS };
+    let limits = Limits { iterations, tolerance: 1e-6, ..LIMITS };
     minimise(&mut RealGains::<f32, 0>::new(parts), &mut tasks, &owners, limits, MEANS, &mut Workspace::default());
     (tasks.settled(0), tasks.reached(0).iterations)
 }
@@ -30,14 +30,17 @@ fn only_what_cannot_win_is_settled() {
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let beside = |lower: f64| {
             let rival = Rival { g: &far, value: reached.value * (1.0 - lower), near: 1e-3 };
-            scout(problem, variables, g, rival)
+            scout(problem, variables, g, rival, 2_000)
         };
         for higher in [1e-9, 1e-6, 1e-3, 0.1] {
             assert!(!beside(-higher).0, "{higher}");
         }
-        assert!(scout(problem, variables, g, Rival { g: &far, value: -1.0, near: 1e-3 }).0);
+        let below = Rival { g: &far, value: -1.0, near: 1e-3 };
+        assert!(scout(problem, variables, g, below, 2_000).0);
+        // Nothing is known of a descent that only its limit stopped.
+        assert!(reached.iterations < 4 || !scout(problem, variables, g, below, 1).0);
         let rival = Rival { g: &end, value: reached.value * (1.0 - 1e-9), near: 1e-3 * norm(&end) };
-        let (settled, steps) = scout(problem, variables, g, rival);
+        let (settled, steps) = scout(problem, variables, g, rival, 2_000);
         assert!(!settled);
         saved += beside(-0.1).1.saturating_sub(steps);
         little += usize::from(beside(3e-3).0);
