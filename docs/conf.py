@@ -36,7 +36,7 @@ autodoc_typehints = "none"  # the numpydoc sections say the types, with shapes
 numpydoc_show_class_members = False
 add_module_names = False
 
-html_sidebars = {page: [] for page in ("install", "theory", "verification", "errors")}  # nothing below them to list
+html_sidebars = {page: [] for page in ("install", "errors", "glossary", "reliability")}  # nothing below them to list
 html_theme = "pydata_sphinx_theme"
 html_title = f"tadcore {release}"
 html_static_path = ["_static"]
@@ -45,7 +45,8 @@ html_show_sourcelink = False
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
-    "header_links_before_dropdown": 7,
+    "header_links_before_dropdown": 9,
+    "navbar_persistent": ["search-button"],
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
     "footer_end": [],
