@@ -97,7 +97,7 @@ def test_every_public_name_of_plotting_is_a_figure_or_is_said():
         assert f"run.plot.{name}(" in index
 
 
-def test_every_error_has_a_cause_and_a_cure():
+def test_every_error_has_a_cause_and_a_fix():
     text = (DOCS / "errors.md").read_text(encoding="utf-8")
     from tadcore import errors
 
@@ -105,7 +105,7 @@ def test_every_error_has_a_cause_and_a_cure():
         thing = getattr(errors, name)
         if isinstance(thing, type) and issubclass(thing, Exception) and name != "TadcoreError":
             assert re.search(rf"^## `{name}`", text, flags=re.MULTILINE), name
-    assert text.count("*Cure*") >= 10
+    assert text.count("*Fix*") >= 10
 
 
 def test_every_page_is_in_a_toctree():
