@@ -1,4 +1,4 @@
-# tadcore: what one can do here. `make` or `make help` lists the targets.
+# tadcore: `make` or `make help` lists the targets.
 #
 # Everything Python happens in .venv; Rust builds land in target/. Both are made on first use.
 
@@ -41,15 +41,15 @@ test-python: $(STAMP)
 	$(BIN)/python -m pytest
 	$(BIN)/python -m mypy.stubtest tadcore._core
 
-heavy: $(STAMP)  ## the tests that take minutes or gigabytes: a million steps, forty defenders of limited sight
+heavy: $(STAMP)  ## the tests that take minutes or gigabytes: a million steps, forty defenders with limited sight
 	$(BIN)/python -m pytest -m heavy
 
-faults: $(STAMP)  ## kill, fill, damage and share a real study; one table of what came of it
+faults: $(STAMP)  ## inject faults into a study (kill, full disk, damage, two writers) and print a table of the results
 	$(BIN)/python -W ignore tests/faults
 
 # Any compiler will do: the switch lets a stable one count coverage. FUZZ_SECONDS is for each of the three targets.
 FUZZ_SECONDS ?= 20
-fuzz: $(STAMP)  ## hostile bytes for the core, the saved table and the readers of files, 60 s in all (needs cargo-fuzz)
+fuzz: $(STAMP)  ## fuzz the core, the saved gain table and the readers of files, 60 s in all (needs cargo-fuzz)
 	cd fuzz && for target in core table; do \
 	  mkdir -p corpus/$$target && RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target corpus/$$target seeds/$$target -- \
 	    -max_total_time=$(FUZZ_SECONDS) -timeout=60 -max_len=2048 || exit 1; done
@@ -61,10 +61,10 @@ sanitize:  ## the core's Rust tests under AddressSanitizer (Linux, x86-64)
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address CARGO_TARGET_DIR=$(or $(CARGO_TARGET_DIR),target)/sanitize PROPTEST_CASES=8 \
 	  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore --lib --tests --no-fail-fast
 
-mutants:  ## a sign flipped or an operator swapped in each formula of the core: which Rust test notices
+mutants:  ## mutation testing: flip a sign or swap an operator in each formula of the core, report which Rust test fails
 	$(PYTHON) tests/mutants
 
-audit: $(STAMP)  ## licences and sources of all that is used; known vulnerabilities where a database can be reached
+audit: $(STAMP)  ## check licences and sources of all dependencies; known vulnerabilities where a database can be reached
 	$(BIN)/python tests/audit.py
 
 lint: $(STAMP)  ## format check, clippy, rustdoc, ruff, mypy: warnings are errors
@@ -83,14 +83,14 @@ format:  ## rewrite sources in the project's format
 bench:  ## Criterion benchmarks of the core
 	cargo bench
 
-peers: $(STAMP)  ## the same work in SciPy, Numba and JAX beside ours, in one process run each
+peers: $(STAMP)  ## compare with the same work in SciPy, Numba and JAX, one process for each
 	$(BIN)/python -m pip install --quiet '.[bench]'
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
-images: $(STAMP)  ## draw again the pictures that tests compare with, and the same with letters into out/images
+images: $(STAMP)  ## redraw the reference images of the tests, and labelled copies into out/images
 	$(BIN)/python -m pytest -q tests/python/test_images.py --mpl-generate-path=tests/python/baseline
 
-docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; warnings are errors
+docs: $(STAMP)  ## build the documentation, every code cell executed, and the core's; warnings are errors
 	RUSTDOCFLAGS="$(RUSTDOC)" cargo doc --workspace --no-deps --locked
 	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
@@ -101,11 +101,11 @@ docs: $(STAMP)  ## the documentation, every code cell executed, and the core's; 
 # the glibc of this machine.
 ZIG := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux2014)
 
-wheel: $(STAMP)  ## one wheel for every Python from 3.11 on (Linux: glibc 2.17 or later), into dist/
+wheel: $(STAMP)  ## build one wheel for every Python from 3.11 on (Linux: glibc 2.17 or later), into dist/
 	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --locked --strip $(ZIG) --out dist
 
-sdist: $(STAMP)  ## the sources as one archive, into dist/
+sdist: $(STAMP)  ## build the source archive, into dist/
 	$(BIN)/python -m pip install --quiet 'maturin[zig]>=1.9,<2'
 	$(BIN)/maturin sdist --out dist
 
