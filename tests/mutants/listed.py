@@ -12,13 +12,19 @@ MUTANTS = of_riccati.MUTANTS | of_lanes.MUTANTS | of_synthesis.MUTANTS | of_game
 
 # Mutants that no test can tell from the program: (file, formula): why.
 EQUIVALENT = {
-    ("synthesis/problem.rs", "W_p: sign"): "Θ, its derivatives and the certificate hold W_p twice in every product",
     (
-        "synthesis/dense/mod.rs",
+        "synthesis/theta/problem.rs",
+        "W_p: sign",
+    ): "Θ, its derivatives and the certificate hold W_p twice in every product",
+    (
+        "synthesis/newton/tile.rs",
         "a pivot to divide by",
     ): "a refused lane is not used, and empty unknowns stand among zeros",
-    ("synthesis/dense/tiles.rs", "registers: empty unknowns, first"): "every tile holds an unknown, the first one",
-    ("synthesis/dense/tiles.rs", "registers: eight rows"): "two tiles one after the other give the same bits",
+    (
+        "synthesis/newton/factor_avx2.rs",
+        "registers: empty unknowns, first",
+    ): "every tile holds an unknown, the first one",
+    ("synthesis/newton/factor_avx2.rs", "registers: eight rows"): "two tiles one after the other give the same bits",
     ("cost/mod.rs", "J: Horner"): "it reverses z from one end of a step to the other, and costs are quadratic in z",
     ("network/visibility.rs", "rounded root, down"): "the next loop climbs back to the same number",
 }

@@ -37,7 +37,7 @@ MUTANTS = {
         ("rounded root, down", "while «square.sqrt() > radius»", "square.sqrt() >= radius"),
         ("rounded root, up", "while «square.next_up().sqrt() <= radius»", "square.next_up().sqrt() < radius"),
     ],
-    "network/memory.rs": [
+    "network/edge_rule.rs": [
         ("hysteresis", "squared_reach(«zeta + rule.hysteresis»)", "zeta - rule.hysteresis"),
         ("hysteresis: which radius", "in «reach.iter().zip(&self.keep)».enumerate()", "self.keep.iter().zip(reach)"),
         ("hysteresis: ≤", "«d2 <= if was { keep } else { form }»", "d2 < if was { keep } else { form }"),

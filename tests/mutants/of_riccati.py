@@ -127,7 +127,7 @@ MUTANTS = {
         ("two_sum", "(sum, «b - (sum - a)»)", "b + (sum - a)"),
         ("growth over the blocks", ".map(|(p, dp)| «escape::growth(p, dp)»)", "-escape::growth(p, dp)"),
     ],
-    "riccati/lanes.rs": [
+    "riccati/stages.rs": [
         *_TABLEAU,
         (
             "tableau: A16",

@@ -1,7 +1,7 @@
 """The mutants of the synthesis but for its factorisations; `listed.py` says how to read a row."""
 
 MUTANTS = {
-    "synthesis/problem.rs": [
+    "synthesis/theta/problem.rs": [
         ("F of I1 and I2", "let sign = if interaction == Interaction::I1 { «-1.0» } else { 1.0 };", "1.0"),
         ("M", "«target[a * size + b] += r[i] * f[a] * f[b];»", "target[a * size + b] -= r[i] * f[a] * f[b];"),
         ("W_p: which P", "«scale * matrix[e]»", "scale * p[e]"),
@@ -16,7 +16,7 @@ MUTANTS = {
         ("constant part, diagonal", "let diagonal = «4.0 * gram[i * m + j] + own»;", "4.0 * gram[i * m + j] - own"),
         ("constant part, w_jᵀw_i", "let factor = «4.0 * sign * w[j * n + a]»;", "-4.0 * sign * w[j * n + a]"),
     ],
-    "synthesis/objective.rs": [
+    "synthesis/theta/real.rs": [
         ("Θ: −M", "*x = «T::all(-t)»;", "T::all(t)"),
         ("Θ: R", "«T::all(r) * g»", "T::all(-r) * g"),
         ("Θ: GᵀRG", "«x[b].plus(factor, gi[b])»", "x[b].minus(factor, gi[b])"),
@@ -82,18 +82,20 @@ MUTANTS = {
         ("rows of a form: x_j", "h[b] = «h[b].plus(factor, x)»;", "h[b].minus(factor, x)"),
         ("rows of a form: x_j − x_i", "«xa[b].minus(v.relative, xi[b])»", "xa[b].plus(v.relative, xi[b])"),
     ],
-    "synthesis/start.rs": [
+    "synthesis/search/start.rs": [
         ("canonical start: projection", "if used(j) { «row[j] - mean» }", "row[j] + mean"),
         ("canonical start: mean", "if relative { «sum / count» }", "sum * count"),
         ("canonical start: own entry", "|j: usize| «j == i || topology.sees(i, j)»", "topology.sees(i, j)"),
         ("variables: own entry", "if «j != i || !relative» {", "j != i || relative"),
+        ("the paper's variables", "relative: «j != i»", "j == i"),
+    ],
+    "synthesis/newton/variables.rs": [
         ("one network: e_j", "«g[v.entry] += x;»", "g[v.entry] -= x;"),
         ("one network: e_j − e_i", "«g[v.own] -= x;»", "g[v.own] += x;"),
-        ("the paper's variables", "relative: «j != i»", "j == i"),
         ("rows that sum to zero", "«-row.iter().map(|v| g[v.entry]).sum::<f64>()»", "g[row[0].own]"),
         ("which rows sum to zero", "filter(|row| «row[0].relative»)", "true"),
     ],
-    "synthesis/layout.rs": [
+    "synthesis/newton/layout.rs": [
         ("rows of a lower triangle", "«i * (i + 1) / 2»", "i * (i + 3) / 2"),
         ("a lane's former variables", "«seen.0 &= !bit;»", "seen.0 |= bit;"),
         ("a lane's former e_j − e_i", "«seen.1 &= !bit;»", "seen.1 |= bit;"),
@@ -120,7 +122,7 @@ MUTANTS = {
         ("form: who has the column", "T::select(«vb.active», ", "T::mask(u16::MAX)"),
         ("form: empty unknowns", "«*x = zero;»", "*x = T::splat(1.0);"),
     ],
-    "synthesis/doubled.rs": [
+    "synthesis/theta/doubled.rs": [
         ("doubled: s", "f64::from(u8::from(«complex»))", "!complex"),
         ("doubled: σ", "if «complex» { -1.0 } else { 1.0 }", "!complex"),
         ("doubled: −M", "*x = «T::all(-t)»;", "T::all(t)"),
@@ -201,7 +203,7 @@ MUTANTS = {
         ("doubled: Hessian BA, X_i", "add_row(h, «T::splat(0.0) - strength», imaginary", "strength"),
         ("doubled: Hessian BA, δ_ij", "if «j == i» {\n                add_row(h, T::splat(0.0)", "j != i"),
     ],
-    "synthesis/newton.rs": [
+    "synthesis/newton/minimise.rs": [
         ("Newton step", "*step = «zero - g»;", "g"),
         ("actual decrease", "let actual = «s.value - value»;", "value - s.value"),
         (
@@ -256,23 +258,23 @@ MUTANTS = {
         ("single precision: ends that rounding makes", "settled |= «stopped» & rivals", "ended"),
         ("rounding in a value", "(«value + (value * scale).sqrt()»)", "T::splat(0.0)"),
     ],
-    "synthesis/tasks.rs": [
+    "synthesis/newton/tasks.rs": [
         ("gradient relative to its parts", "{ «slope / scale» }", "slope * scale"),
         ("converged", "(«relative <= limits.acceptable»,", "relative > limits.acceptable"),
         ("iteration limit", ", «iterations >= limits.iterations»)", "iterations < limits.iterations"),
         ("descents that are kept", "filter(|&task| «keep[task]»)", "!keep[task]"),
     ],
-    "synthesis/parts.rs": [
+    "synthesis/theta/coefficients.rs": [
         ("range of single precision", "«RANGE.0 <= x && x <= RANGE.1»", "true"),
         ("single precision: F", "fne: all(«&self.fne»)", "&self.r"),
         ("single precision: c", "closeness: all(«&self.closeness»)", "&self.r"),
     ],
-    "synthesis/engine.rs": [
+    "synthesis/search/dispatch.rs": [
         ("certificate: nothing to prove", "«largest.at_most(T::splat(0.0))»", "T::splat(0.0).at_most(largest)"),
         ("certificate: of which lane", "proved >> («task - first»)", "last - 1 - task"),
         ("certificate: rounding", "let allowance = «T::splat(CERTIFICATE_ROUNDING)» * largest;", "T::splat(-1e-3)"),
     ],
-    "synthesis/descent.rs": [
+    "synthesis/search/gradient.rs": [
         ("the paper's descent: direction", ".map(|x| «-length * x»)", "length * x"),
         (
             "the paper's descent: Armijo",
@@ -281,14 +283,14 @@ MUTANTS = {
         ),
         ("the paper's descent: step length", "map(|(s, (n, o))| «s * (n - o)»)", "s * (n + o)"),
     ],
-    "synthesis/entry.rs": [
+    "synthesis/search/candidate.rs": [
         (
             "a look must win",
             "«self.reached.value - TIE * self.reached.value.abs()»",
             "self.reached.value + TIE * self.reached.value.abs()",
         ),
     ],
-    "synthesis/looks.rs": [
+    "synthesis/search/stages.rs": [
         ("one reversed row", "scale_rows(n, g, &[i], «-1.0»,", "1.0"),
         ("two reversed rows", "scale_rows(n, g, &[i, j], «-1.0»,", "1.0"),
         ("one row left out", "&entries[e].start, &[i], «0.0»,", "1.0"),

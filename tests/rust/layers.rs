@@ -1,4 +1,5 @@
-//! The order of the layers: a module uses only modules that stand above it in the table of `lib.rs`.
+//! The order of the layers: a module uses only modules that stand above it in the table of `lib.rs`, and inside the
+//! synthesis only those above it in the table of `synthesis/mod.rs`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,6 +20,13 @@ const LAYERS: [&str; 12] = [
     "ensemble",
 ];
 
+/// The modules of the synthesis from the ground up, and the layers that each may use.
+const SYNTHESIS: [(&str, &[&str]); 3] = [
+    ("newton", &["width", "lanes"]),
+    ("theta", &["width", "lanes", "game"]),
+    ("search", &["width", "lanes", "game", "network"]),
+];
+
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a source folder") {
         let path = entry.expect("an entry").path();
@@ -30,6 +38,81 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
+/// The module that a file is, from the root of the crate: `synthesis/newton/tile.rs` → synthesis, newton, tile.
+fn module(relative: &Path) -> Vec<String> {
+    let path = relative.with_extension("");
+    let names = path.components().map(|name| name.as_os_str().to_string_lossy().into_owned());
+    names.filter(|name| name != "mod" && name != "lib").collect()
+}
+
+/// The paths that a source text names by `crate::` or `super::`, from the root of the crate; docs included.
+fn uses(module: &[String], text: &str) -> Vec<Vec<String>> {
+    let mut inside = module.to_vec();
+    let mut found = Vec::new();
+    for line in text.lines() {
+        // A module within the file, of which every line is indented.
+        if let Some((_, name)) = line.strip_suffix(" {").and_then(|line| line.rsplit_once("mod ")) {
+            inside.push(name.to_owned());
+        } else if line == "}" {
+            inside.truncate(module.len());
+        }
+        let words = line.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':'));
+        found.extend(words.filter_map(|word| absolute(&inside, word)));
+    }
+    found
+}
+
+/// The path from the root of the crate that a word like `super::game::Game` names.
+fn absolute(module: &[String], word: &str) -> Option<Vec<String>> {
+    let mut path = match word.split_once("::")?.0 {
+        "crate" => Vec::new(),
+        "super" => module.to_vec(),
+        _ => return None,
+    };
+    for name in word.split("::") {
+        match name {
+            "crate" => {}
+            "super" => {
+                path.pop();
+            }
+            // What follows is a group or a star: `use super::*`.
+            "" => break,
+            _ => path.push(name.to_owned()),
+        }
+    }
+    Some(path)
+}
+
+/// What a source text uses that does not stand above its module, and how many uses were checked.
+fn violations(module: &[String], text: &str) -> (Vec<String>, usize) {
+    let position = |name: &str| LAYERS.iter().position(|&layer| layer == name);
+    let room = |path: &[String]| path.get(1).and_then(|own| SYNTHESIS.iter().position(|&(name, _)| name == own));
+    let Some(own) = module.first() else { return (Vec::new(), 0) };
+    let Some(layer) = position(own) else { return (vec![format!("{own} is no layer")], 0) };
+    let mut wrong = Vec::new();
+    let used = uses(module, text);
+    for path in &used {
+        let shown = path.join("::");
+        let Some(name) = path.first() else {
+            wrong.push(format!("{} names the crate itself, or several of its layers at once", module.join("::")));
+            continue;
+        };
+        if position(name).is_none_or(|used| used > layer) {
+            wrong.push(format!("{} uses {shown}, which does not stand above it", module.join("::")));
+        }
+        let (true, Some(own)) = (own == "synthesis", room(module)) else { continue };
+        let allowed = if name == "synthesis" {
+            room(path).is_some_and(|used| used <= own)
+        } else {
+            SYNTHESIS[own].1.contains(&name.as_str())
+        };
+        if !allowed {
+            wrong.push(format!("{} uses {shown}, which it is not to know", module.join("::")));
+        }
+    }
+    (wrong, used.len())
+}
+
 #[test]
 fn a_layer_uses_only_layers_above_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -37,25 +120,49 @@ fn a_layer_uses_only_layers_above_it() {
     sources(&root, &mut files);
     let mut checked = 0;
     for file in files {
-        let relative = file.strip_prefix(&root).expect("inside src");
-        let layer = relative.components().next().expect("a name").as_os_str().to_string_lossy().replace(".rs", "");
-        let Some(own) = LAYERS.iter().position(|&l| l == layer) else {
-            assert_eq!(layer, "lib", "{} belongs to no layer", relative.display());
-            continue;
-        };
-        let text = fs::read_to_string(&file).expect("a readable source");
-        for part in text.split("crate::").skip(1) {
-            let name: String = part.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            let used = LAYERS.iter().position(|&l| l == name);
-            assert!(
-                used.is_some_and(|used| used <= own),
-                "{} ({layer}) uses crate::{name}, which does not stand above it",
-                relative.display()
-            );
-            checked += 1;
-        }
+        let module = module(file.strip_prefix(&root).expect("inside src"));
+        let (wrong, count) = violations(&module, &fs::read_to_string(&file).expect("a readable source"));
+        assert!(wrong.is_empty(), "{}: {wrong:#?}", file.display());
+        checked += count;
     }
-    assert!(checked > 30, "only {checked} uses found: is the test still looking at the sources?");
+    assert!(checked > 200, "only {checked} uses found: is the test still looking at the sources?");
+}
+
+/// The check itself: what it must find, and what it must not.
+#[test]
+fn a_use_of_what_stands_below_is_found() {
+    let found = |file: &str, text: &str| violations(&module(Path::new(file)), text).0.len();
+    for (file, text) in [
+        ("game/grid.rs", "use crate::policy::Policy;"),
+        ("game/grid.rs", "use super::super::policy::Policy;"),
+        ("game/mod.rs", "fn f() { super::riccati::solve() }"),
+        ("width.rs", "use crate::{game::Game, lanes::Number};"),
+        ("width.rs", "mod tests {\n    use super::super::game::Game;\n}"),
+        ("unknown/mod.rs", ""),
+        ("synthesis/newton/tile.rs", "use crate::network::Topology;"),
+        ("synthesis/newton/tile.rs", "use crate::game::Game;"),
+        ("synthesis/newton/tile.rs", "use crate::synthesis::theta::Problem;"),
+        ("synthesis/newton/mod.rs", "use super::search::Search;"),
+        ("synthesis/newton/mod.rs", "use super::{search, theta};"),
+        ("synthesis/newton/tile.rs", "use crate::synthesis::Gains;"),
+        ("synthesis/theta/real.rs", "use crate::network::Topology;"),
+        ("synthesis/theta/real.rs", "/// See [`crate::synthesis::search`]."),
+        ("synthesis/search/start.rs", "use crate::riccati::Equilibrium;"),
+        ("synthesis/search/start.rs", "use crate::policy::Policy;"),
+    ] {
+        assert_eq!(found(file, text).min(1), 1, "{file}: {text}");
+    }
+    for (file, text) in [
+        ("policy/mod.rs", "use crate::synthesis::Gains; use super::game::Game;"),
+        ("width.rs", "mod tests {\n    use super::*;\n}"),
+        ("game/grid.rs", "use super::validation::rule; use crate::error::GameError;"),
+        ("synthesis/mod.rs", "use crate::network::Topology; use super::riccati;"),
+        ("synthesis/newton/tile.rs", "use super::layout::{GROUP, packed}; use crate::lanes::Number; use super::*;"),
+        ("synthesis/theta/real.rs", "use crate::synthesis::newton::{Form, Slot}; use crate::game::Game;"),
+        ("synthesis/search/stages.rs", "use super::start::variables; use crate::synthesis::theta::Problem;"),
+    ] {
+        assert_eq!(found(file, text), 0, "{file}: {text}");
+    }
 }
 
 #[test]

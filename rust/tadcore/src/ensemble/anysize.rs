@@ -1,7 +1,7 @@
 //! A sweep for sizes known only at run time, trial after trial.
 
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, playing};
-use crate::policy::shelf::{Shelf, padded};
+use crate::policy::step_table::{Shelf, padded};
 
 /// One step of the strips from one on; a [`Sweep`](super::strip::Sweep) that does not look ahead.
 pub(super) fn sweep_any(

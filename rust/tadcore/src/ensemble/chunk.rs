@@ -12,7 +12,7 @@ use crate::error::RunError;
 use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
-use crate::policy::shelf::Shelf;
+use crate::policy::step_table::Shelf;
 use crate::policy::transitions::Filler;
 use crate::simulation::{Outcome, Reach};
 use crate::width::Width;

@@ -9,7 +9,7 @@
 //!
 //! A [`Sweep`] moves strips; [`super::sweep`] has it compiled for the sizes that matter, [`super::anysize`] for all others.
 
-use crate::policy::shelf::Shelf;
+use crate::policy::step_table::Shelf;
 
 /// Trials side by side.
 pub(super) const LANES: usize = 8;

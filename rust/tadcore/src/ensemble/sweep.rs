@@ -12,7 +12,8 @@ use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
 use super::vector::{Plain, Vector};
 #[cfg(target_arch = "x86_64")]
 use super::vector::{Wide256, Wide512};
-use crate::policy::shelf::{DIRECT_BITS, Shelf};
+use crate::policy::index::DIRECT_BITS;
+use crate::policy::step_table::Shelf;
 use crate::width::Width;
 
 /// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first

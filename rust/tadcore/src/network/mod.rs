@@ -9,11 +9,11 @@
 //!
 //! Player i may use z_i when it sees the attacker, and z_j − z_i for each j that it sees: the row space of 𝓘_i.
 
-mod memory;
+mod edge_rule;
 mod topology;
 mod visibility;
 
-pub use memory::{EdgeRule, Memory};
+pub use edge_rule::{EdgeRule, Memory};
 pub use topology::Topology;
 pub use visibility::{observe, squared_distance, squared_norm, squared_reach};
 

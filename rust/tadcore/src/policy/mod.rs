@@ -14,9 +14,11 @@
 mod budget;
 pub mod closed_loop;
 pub mod exponential;
+mod hash_table;
+pub(crate) mod index;
 mod relabelling;
 mod saved;
-pub(crate) mod shelf;
+pub(crate) mod step_table;
 mod table;
 pub(crate) mod transitions;
 

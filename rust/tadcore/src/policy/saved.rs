@@ -6,7 +6,7 @@
 //! crate, since another version may choose other gains.
 
 use super::Policy;
-use super::shelf::padded;
+use super::step_table::padded;
 use crate::error::TableError;
 use crate::game::{Game, Interaction};
 use crate::network::Topology;

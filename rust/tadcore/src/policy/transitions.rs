@@ -13,7 +13,7 @@ use std::time::Duration;
 use super::Policy;
 use super::budget::Budget;
 use super::closed_loop::FreeRows;
-use super::shelf::{Shelf, padded};
+use super::step_table::{Shelf, padded};
 use crate::cancel::CancelToken;
 use crate::error::Cancelled;
 use crate::network::Topology;

@@ -22,9 +22,9 @@
 //! Source: eq:Riccati of the paper, with the sign of time reversed.
 
 use super::dop853::{self, Flow};
-use super::lanes::LANES;
 use super::large::Large;
 use super::register::fused;
+use super::stages::LANES;
 use super::{finite, triangle, weight};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;

@@ -18,7 +18,7 @@
 
 use super::aligned::Aligned;
 use super::escape;
-use super::lanes::{self, DENSE, STAGES};
+use super::stages::{self, DENSE, STAGES};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::width::Width;
@@ -38,7 +38,7 @@ const GROW: f64 = 6.0;
 
 /// An autonomous right-hand side on a stack of blocks, each padded with zeros to whole lanes.
 pub(super) trait Flow {
-    /// Entries of one block, padding included: a multiple of [`lanes::LANES`].
+    /// Entries of one block, padding included: a multiple of [`stages::LANES`].
     fn block_len(&self) -> usize;
     /// dy/ds at `y`; the padding of `dy` is left at zero.
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]);
@@ -82,7 +82,7 @@ impl Workspace {
     /// Evaluates stage `i` of a step of length h.
     fn evaluate(&mut self, flow: &mut dyn Flow, i: usize, h: f64) {
         let point = &mut self.point[..self.len];
-        lanes::point(self.width, i, point, &self.y, &self.k, h);
+        stages::point(self.width, i, point, &self.y, &self.k, h);
         flow.derivative(point, &mut self.k[i * self.len..(i + 1) * self.len]);
     }
 
@@ -92,13 +92,13 @@ impl Workspace {
         for i in 1..12 {
             self.evaluate(flow, i, h);
         }
-        lanes::point(self.width, 12, &mut self.y_new, &self.y, &self.k, h);
+        stages::point(self.width, 12, &mut self.y_new, &self.y, &self.k, h);
         let mut worst = 0.0_f64;
         for start in (0..self.len).step_by(self.block) {
             let end = start + self.block;
             flow.weigh(&self.y_new[start..end], &mut self.point[start..end]);
             let weight = &self.point[..self.len];
-            let (five, three, size) = lanes::error_sums(self.width, &self.k, &self.y_new, weight, start, self.block);
+            let (five, three, size) = stages::error_sums(self.width, &self.k, &self.y_new, weight, start, self.block);
             if !(five.is_finite() && three.is_finite()) {
                 return f64::NAN;
             }
@@ -120,7 +120,7 @@ impl Workspace {
         for i in 13..STAGES {
             self.evaluate(flow, i, h);
         }
-        lanes::dense(self.width, &mut self.dense, &self.y, &self.y_new, &self.k, h);
+        stages::dense(self.width, &mut self.dense, &self.y, &self.y_new, &self.k, h);
     }
 
     /// A hundredth of the time in which some block would change by its own size.
@@ -200,9 +200,9 @@ pub(super) fn integrate(
                 let end = if last { steps } else { steps + 1 };
                 let count = 1 + (next + 1..end).take(TOGETHER - 1).take_while(|&j| node(j) <= reached).count();
                 if count == 1 {
-                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, [theta[0]]);
+                    stages::interpolate(w.width, &mut w.point, &w.y, &w.dense, [theta[0]]);
                 } else {
-                    lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, theta);
+                    stages::interpolate(w.width, &mut w.point, &w.y, &w.dense, theta);
                 }
                 for point in w.point.chunks_exact(w.len).take(count) {
                     sink(next, point);
@@ -260,7 +260,7 @@ mod tests {
         let mut inside = 0.0_f64;
         for i in 1..10 {
             let theta = f64::from(i) / 10.0;
-            lanes::interpolate(w.width, &mut w.point, &w.y, &w.dense, [theta]);
+            stages::interpolate(w.width, &mut w.point, &w.y, &w.dense, [theta]);
             inside = inside.max((w.point[0] - (start + theta * h).tan()).abs());
         }
         (end, inside)

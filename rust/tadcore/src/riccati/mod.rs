@@ -23,7 +23,7 @@
 //! |---|---|
 //! | `coupled`, `large` | I1: the right-hand side for N known to the compiler, and for any N |
 //! | `triangle` | how the matrices of a large game are stored |
-//! | `dop853`, `lanes`, `tableau` | the adaptive integrator of order 8, its loops, its coefficients |
+//! | `dop853`, `stages`, `tableau` | the adaptive integrator of order 8, its loops, its coefficients |
 //! | `weight` | the norm of its error |
 //! | `hamiltonian` | I2: exact steps that cannot jump over a pole |
 //! | `escape` | what counts as an escape, and when it happens |
@@ -36,10 +36,10 @@ mod coupled;
 mod dop853;
 mod escape;
 mod hamiltonian;
-mod lanes;
 mod large;
 mod register;
 mod residual;
+mod stages;
 mod tableau;
 mod triangle;
 mod weight;

@@ -20,7 +20,7 @@
 
 use super::Equilibrium;
 use super::dop853::{self, Flow};
-use super::lanes::LANES;
+use super::stages::LANES;
 use super::weight;
 use crate::cancel::CancelToken;
 use crate::game::{Game, Interaction};

@@ -12,38 +12,33 @@
 //! | Θ | [`Gains::theta`] | Θ₁ (eq:errfun1) or Θ₂ (eq:errfun2), in reduced norms: a block norm is `dim` times as large |
 //! | γ | weights of Θ's terms | |
 //!
-//! Θ is non-convex. The answer is the global minimiser as far as [`looks`] can find it, and `certified` says when it is
+//! Θ is non-convex. The answer is the global minimiser as far as [`search`] can find it, and `certified` says when it is
 //! proved to be. It is a function of the instant and the topology alone: never of the state, of a previous gain or of
 //! the way the game got there, so that it can be tabulated and shared.
+//!
+//! Three modules, each using only those above it (asserted by a test):
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | `newton` | many small descents side by side; no game and no network |
+//! | `theta` | Θ of one instant, its gradient and its Hessian; no network |
+//! | [`search`] | which descents are made for a network, and when no more are needed |
 //!
 //! Sizes N ≤ 8 are compiled with constant loop bounds (measured at n = 3: 2.6 times as fast as with bounds known at run
 //! time); larger ones share one version whose factorisations go to faer.
 
-mod dense;
-mod descent;
-mod doubled;
-mod engine;
-mod entry;
-mod layout;
-pub mod looks;
 mod newton;
-mod objective;
-mod parts;
-mod problem;
-mod start;
-mod tasks;
-mod workspace;
+pub mod search;
+mod theta;
 
-pub(crate) use engine::SIDE_BY_SIDE_UP_TO;
-pub use entry::Look;
-pub use problem::Problem;
-pub use tasks::Status;
+pub use newton::Status;
+pub use search::Look;
+pub(crate) use search::SIDE_BY_SIDE_UP_TO;
+pub use theta::Problem;
 
 use crate::network::Topology;
-use engine::Engine;
-use entry::Entry;
-use looks::Search;
-use tasks::{Limits, Tasks};
+use newton::{Limits, Tasks};
+use search::{Engine, Entry, Search};
 
 /// How the gains are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -178,8 +173,8 @@ impl Synthesizer {
             .iter()
             .map(|topology| {
                 let mut start = vec![0.0; problem.rows * problem.size];
-                start::canonical(problem, topology, &mut start);
-                Entry::new(start::variables(topology), start)
+                search::canonical(problem, topology, &mut start);
+                Entry::new(search::variables(topology), start)
             })
             .collect();
         let Self { engine, tasks, doubled } = self;
@@ -188,8 +183,8 @@ impl Synthesizer {
             Method::Newton => search.run::<N>(&mut entries),
             Method::Descent => {
                 for (entry, topology) in entries.iter_mut().zip(topologies) {
-                    let variables = start::paper_variables(topology);
-                    entry.reached = descent::descend(problem, &mut entry.g, &variables, limits);
+                    let variables = search::paper_variables(topology);
+                    entry.reached = search::descend(problem, &mut entry.g, &variables, limits);
                     entry.iterations = entry.reached.iterations;
                 }
                 let all: Vec<usize> = (0..entries.len()).collect();

@@ -1,15 +1,13 @@
 //! Derivatives against differences, the value against its terms, and lanes against one number.
 
-use super::doubled::Doubled;
-use super::layout::{Layout, packed};
-use super::newton::Objective;
-use super::objective::RealGains;
-use super::start::Variable;
+use super::newton::{Layout, Objective, Variable, packed};
+use super::theta::{Doubled, RealGains};
 use super::*;
 use crate::game::Interaction;
 use crate::width::Width;
 
 mod descents;
+mod kinds;
 mod single;
 
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {

@@ -1,11 +1,8 @@
 //! Single descents: the damping of each step on quadratic functions, where closed forms say what it is, and how early a
 //! descent ends that has a rival.
 
-use super::super::dense::Means;
-use super::super::layout::{Form, Slot};
-use super::super::newton::minimise;
-use super::super::tasks::{Owner, Reached, Rival};
-use super::super::workspace::Workspace;
+use super::super::newton::{Form, Means, Owner, Reached, Rival, Slot, Workspace, advance, minimise};
+use super::super::search::{canonical, variables};
 use super::*;
 use crate::lanes::norm;
 
@@ -111,8 +108,8 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
         for key in (1..1u64 << (m * n)).step_by(if m * n > 9 { 61 } else { 7 }) {
             let topology = Topology::from_key(m, n, key);
             let mut g = vec![0.0; m * n];
-            start::canonical(&problem, &topology, &mut g);
-            visit(&problem, &start::variables(&topology), &g);
+            canonical(&problem, &topology, &mut g);
+            visit(&problem, &variables(&topology), &g);
         }
     }
 }
@@ -157,7 +154,7 @@ fn a_descent_ends_where_it_is_back() {
         let near = 1e-3 * norm(&best);
         let mut off = best.clone();
         let by: Vec<f64> = (0..variables.len()).map(|v| 0.05 * (1.0 + v as f64).sin() * norm(&best)).collect();
-        start::advance(&mut off, variables, &by);
+        advance(&mut off, variables, &by);
         let (end, alone) = descend(&mut real, &off, variables, None, LIMITS);
         if near == 0.0 || norm(&difference(&end, &best)) > 1e-6 * norm(&best) {
             return;

@@ -1,8 +1,7 @@
 //! Looks in single precision: what they leave out must be nothing, and what they cannot decide is decided in double.
 
-use super::super::newton::minimise;
-use super::super::tasks::{Owner, Rival};
-use super::super::workspace::Workspace;
+use super::super::newton::{Owner, Rival, Workspace, balance, minimise};
+use super::super::search::variables;
 use super::descents::{LIMITS, MEANS, descend, each};
 use super::*;
 use crate::lanes::norm;
@@ -87,6 +86,6 @@ fn out_of_range_everything_is_done_in_double() {
 fn rows_are_balanced() {
     let topology = Topology::from_words(2, 3, &[0b010_110]);
     let mut g = vec![9.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-    start::balance(&mut g, &start::variables(&topology));
+    balance(&mut g, &variables(&topology));
     assert_eq!(g, [-5.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
 }

@@ -4,7 +4,7 @@ use crate::lanes::Scalar;
 
 /// The numbers of one instant: the symbols of [`super::problem`].
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Parts<S> {
+pub(crate) struct Parts<S> {
     /// N.
     pub size: usize,
     /// m.
@@ -30,7 +30,7 @@ pub(super) struct Parts<S> {
 
 /// Norms that say how large the cancelling parts of Θ and its gradient are.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     /// ‖F‖.
     pub fne: f64,
     /// ‖M‖.
@@ -50,14 +50,14 @@ const RANGE: (f64, f64) = (1e-9, 1e12);
 
 impl Parts<f64> {
     /// Whether Θ and gains of the size of F, their gradients and curvatures lie well within single precision.
-    pub(super) fn in_range(&self) -> bool {
+    pub(crate) fn in_range(&self) -> bool {
         let within = |x: f64| RANGE.0 <= x && x <= RANGE.1;
         let (s, value) = (&self.scale, self.scale.value);
         within(value) && within(s.fne * s.fne) && within(value / (s.fne * s.fne))
     }
 
     /// Every number rounded.
-    pub(super) fn rounded(&self) -> Parts<f32> {
+    pub(crate) fn rounded(&self) -> Parts<f32> {
         let all = |numbers: &[f64]| numbers.iter().map(|&x| f32::of(x)).collect();
         Parts {
             size: self.size,

@@ -1,14 +1,14 @@
 //! The unknowns of several networks side by side, and forms on the gains restricted to them.
 
-use super::start::Variable;
+use super::variables::Variable;
 use crate::lanes::Number;
 
 /// Unknowns come in groups of this size, that factorisations take at once: the last are filled up with empty ones.
-pub(super) const GROUP: usize = 4;
+pub(crate) const GROUP: usize = 4;
 
 /// An unknown: the variable of at least one of the networks side by side, or of none.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Slot<T: Number> {
+pub(crate) struct Slot<T: Number> {
     /// Position of (i, j) in the gains.
     pub entry: usize,
     /// Position of (i, i), subtracted where the variable is relative.
@@ -22,14 +22,14 @@ pub(super) struct Slot<T: Number> {
 }
 
 /// A quadratic form on the gains, given by rows.
-pub(super) trait Form<T: Number> {
+pub(crate) trait Form<T: Number> {
     /// Writes the form's product with the direction of `v`: its entries before and in the block of `v`.
     fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]);
 }
 
 /// The variables of the networks in the lanes: an unknown that a lane does not have stays where it is.
 #[derive(Debug)]
-pub(super) struct Layout<T: Number> {
+pub(crate) struct Layout<T: Number> {
     slots: Vec<Slot<T>>,
     /// The slots that are not empty in all lanes.
     used: usize,
@@ -46,14 +46,14 @@ impl<T: Number> Default for Layout<T> {
 
 /// Where row i of a packed lower triangle begins.
 #[inline(always)]
-pub(super) fn packed(i: usize) -> usize {
+pub(crate) fn packed(i: usize) -> usize {
     i * (i + 1) / 2
 }
 
 impl<T: Number> Layout<T> {
     /// Begins with empty lanes, for `copies` copies of `width` gains.
     #[inline(always)]
-    pub(super) fn begin(&mut self, width: usize, copies: usize) {
+    pub(crate) fn begin(&mut self, width: usize, copies: usize) {
         self.copies = copies;
         self.seen.clear();
         self.seen.resize(width, (0, 0, 0));
@@ -61,7 +61,7 @@ impl<T: Number> Layout<T> {
 
     /// Gives a lane its variables. What follows holds once the slots are [listed](Self::list).
     #[inline(always)]
-    pub(super) fn place(&mut self, lane: usize, variables: &[Variable]) {
+    pub(crate) fn place(&mut self, lane: usize, variables: &[Variable]) {
         let bit = 1u16 << lane;
         for seen in &mut self.seen {
             seen.0 &= !bit;
@@ -77,7 +77,7 @@ impl<T: Number> Layout<T> {
 
     /// Lists the unknowns of the lanes.
     #[inline(always)]
-    pub(super) fn list(&mut self) {
+    pub(crate) fn list(&mut self) {
         self.slots.clear();
         let (width, one, zero) = (self.seen.len(), T::splat(1.0), T::splat(0.0));
         for copy in 0..self.copies {
@@ -100,25 +100,25 @@ impl<T: Number> Layout<T> {
 
     /// The unknowns, empty ones included.
     #[inline(always)]
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.slots.len()
     }
 
     /// The unknowns that are not empty in all lanes: the first ones.
     #[inline(always)]
-    pub(super) fn used(&self) -> usize {
+    pub(crate) fn used(&self) -> usize {
         self.used
     }
 
     /// The lanes that have an unknown.
     #[inline(always)]
-    pub(super) fn active(&self, slot: usize) -> T::Mask {
+    pub(crate) fn active(&self, slot: usize) -> T::Mask {
         self.slots[slot].active
     }
 
     /// The largest diagonal entry of a restricted form.
     #[inline(always)]
-    pub(super) fn largest(&self, form: &[T]) -> T {
+    pub(crate) fn largest(&self, form: &[T]) -> T {
         let mut largest = T::splat(0.0);
         for i in 0..self.used {
             largest = largest.or_larger(form[packed(i) + i].abs());
@@ -128,7 +128,7 @@ impl<T: Number> Layout<T> {
 
     /// Adds Σ x_v · direction_v to the gains.
     #[inline(always)]
-    pub(super) fn advance(&self, g: &mut [T], x: &[T]) {
+    pub(crate) fn advance(&self, g: &mut [T], x: &[T]) {
         for (v, &x) in self.slots[..self.used].iter().zip(x) {
             g[v.entry] = g[v.entry] + x;
             g[v.own] = g[v.own].minus(v.relative, x);
@@ -137,7 +137,7 @@ impl<T: Number> Layout<T> {
 
     /// Restricts a gradient with respect to the m × N gains to the variables.
     #[inline(always)]
-    pub(super) fn restrict(&self, full: &[T], out: &mut [T]) {
+    pub(crate) fn restrict(&self, full: &[T], out: &mut [T]) {
         for (v, out) in self.slots.iter().zip(out) {
             *out = T::select(v.active, full[v.entry].minus(v.relative, full[v.own]), T::splat(0.0));
         }
@@ -146,7 +146,7 @@ impl<T: Number> Layout<T> {
     /// Restricts a quadratic form on the gains to the variables: the packed lower triangle of `out`. `row` holds one of
     /// the form's.
     #[inline(always)]
-    pub(super) fn restrict_form(&self, form: &impl Form<T>, g: &[T], row: &mut [T], out: &mut [T]) {
+    pub(crate) fn restrict_form(&self, form: &impl Form<T>, g: &[T], row: &mut [T], out: &mut [T]) {
         let zero = T::splat(0.0);
         for (a, va) in self.slots[..self.used].iter().enumerate() {
             form.row(g, va, row);

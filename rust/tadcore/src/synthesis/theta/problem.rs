@@ -11,21 +11,21 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
-use super::parts::{Parts, Scale};
+use super::coefficients::{Parts, Scale};
 use crate::game::{Game, Interaction};
 use crate::lanes::{norm, sum_of_squares};
 
 /// Everything Θ needs to know of one instant t_k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    pub(super) interaction: Interaction,
-    pub(super) size: usize,
-    pub(super) rows: usize,
-    pub(super) gamma: Vec<f64>,
+    pub(crate) interaction: Interaction,
+    pub(crate) size: usize,
+    pub(crate) rows: usize,
+    pub(crate) gamma: Vec<f64>,
     /// What Θ is made of.
-    pub(super) double: Parts<f64>,
+    pub(crate) double: Parts<f64>,
     /// The same in single precision, where that can hold it.
-    pub(super) single: Option<Parts<f32>>,
+    pub(crate) single: Option<Parts<f32>>,
 }
 
 impl Problem {

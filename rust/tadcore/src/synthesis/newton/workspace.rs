@@ -5,27 +5,27 @@ use crate::lanes::Number;
 
 /// The memory of descents side by side.
 #[derive(Debug)]
-pub(super) struct Workspace<T: Number> {
+pub(crate) struct Workspace<T: Number> {
     /// The variables of the lanes.
-    pub(super) layout: Layout<T>,
+    pub(crate) layout: Layout<T>,
     /// The points.
-    pub(super) g: Vec<T>,
+    pub(crate) g: Vec<T>,
     /// The gradients there, with respect to all gains.
-    pub(super) slope: Vec<T>,
+    pub(crate) slope: Vec<T>,
     /// The points tried.
-    pub(super) trial: Vec<T>,
+    pub(crate) trial: Vec<T>,
     /// The gradients there.
-    pub(super) trial_slope: Vec<T>,
+    pub(crate) trial_slope: Vec<T>,
     /// The best points known.
-    pub(super) rival: Vec<T>,
+    pub(crate) rival: Vec<T>,
     /// A row of a form on all gains, the form restricted to the variables, and its factor.
-    pub(super) row: Vec<T>,
-    pub(super) hessian: Vec<T>,
-    pub(super) factor: Vec<T>,
+    pub(crate) row: Vec<T>,
+    pub(crate) hessian: Vec<T>,
+    pub(crate) factor: Vec<T>,
     /// The gradient with respect to the variables, the step, and a vector to spare.
-    pub(super) gradient: Vec<T>,
-    pub(super) step: Vec<T>,
-    pub(super) other: Vec<T>,
+    pub(crate) gradient: Vec<T>,
+    pub(crate) step: Vec<T>,
+    pub(crate) other: Vec<T>,
 }
 
 impl<T: Number> Default for Workspace<T> {
@@ -51,7 +51,7 @@ impl<T: Number> Default for Workspace<T> {
 impl<T: Number> Workspace<T> {
     /// Makes room for gains of `width` entries.
     #[inline(always)]
-    pub(super) fn grow(&mut self, width: usize) {
+    pub(crate) fn grow(&mut self, width: usize) {
         let unknowns = width.next_multiple_of(GROUP);
         let room = |numbers: &mut Vec<T>, len| {
             if numbers.len() < len {

@@ -1,17 +1,17 @@
 //! The look that is said to have won, against descents in its kind of gains alone.
 
+use super::super::newton::{Limits, Owner, Tasks};
+use super::super::search::{
+    BASIN, Engine, Entry, Kind, LONGEST_STEP, LOOK_ITERATIONS, canonical, far_start, variables,
+};
 use super::*;
-use crate::game::Interaction;
-use crate::network::Topology;
-use crate::synthesis::tests::sample;
-use crate::synthesis::{Options, Synthesizer};
 
 /// The lowest Θ that descents in complex gains, or in stacked ones, lead to from the far start.
 fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
     let (engine, tasks) = (&mut Engine::default(), &mut Tasks::default());
-    let mut canonical = vec![0.0; problem.rows * problem.size];
-    start::canonical(problem, topology, &mut canonical);
-    let entry = Entry::new(start::variables(topology), canonical);
+    let mut start = vec![0.0; problem.rows * problem.size];
+    canonical(problem, topology, &mut start);
+    let entry = Entry::new(variables(topology), start);
     let owners = [Owner { variables: &entry.variables, rival: None }];
     let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
     let scale = problem.double.scale.fne;

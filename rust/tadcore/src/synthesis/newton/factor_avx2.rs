@@ -1,12 +1,12 @@
 //! One matrix at a time in the registers of AVX2: four columns of a tile side by side, up to eight rows at once.
 //!
-//! Every entry takes the operations of [the loops over numbers](super::factorise) in their order, so the bits are the same.
+//! Every entry takes the operations of [the loops over numbers](super::factor::factorise) in their order, so the bits are the same.
 
 use std::arch::x86_64::*;
 
-use super::{Pivots, Tile, diagonal};
+use super::layout::{GROUP, packed};
+use super::tile::{Pivots, Tile, diagonal};
 use crate::lanes::transpose;
-use crate::synthesis::layout::{GROUP, packed};
 
 /// Four numbers from `from[at]` on.
 #[inline]
@@ -43,9 +43,9 @@ fn subtract<const R: usize>(mut a: [__m256d; R], row: usize, column: usize, f: &
     a
 }
 
-/// See [`super::factorise`].
+/// See [`super::factor::factorise`].
 #[target_feature(enable = "avx2,fma")]
-pub(super) fn factorise(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> (bool, f64) {
+pub(crate) fn factorise(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> (bool, f64) {
     let mut pivots = Pivots::new();
     for first in (0..d).step_by(GROUP) {
         let (mut tile, mut rows): (Tile<f64>, _) = ([[0.0; GROUP]; GROUP], [_mm256_setzero_pd(); GROUP]);

@@ -1,8 +1,7 @@
 //! A network that is being solved: its variables, the best gains found so far, and the look that found them.
 
-use super::start::Variable;
-use super::tasks::{Owner, Reached, Rival};
 use crate::lanes::norm;
+use crate::synthesis::newton::{Owner, Reached, Rival, Variable};
 
 /// The look that won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,13 +18,13 @@ pub enum Look {
 
 /// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as
 /// small makes no other points of A + B and A − B.
-pub(super) const BACK: f64 = 1e-3;
+pub(crate) const BACK: f64 = 1e-3;
 /// How much lower, relatively, a look must be to win.
 const TIE: f64 = 1e-9;
 
 /// One network at the instant: its variables, and the best gains found so far.
 #[derive(Debug)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub variables: Vec<Variable>,
     pub start: Vec<f64>,
     pub g: Vec<f64>,
@@ -40,7 +39,7 @@ pub(super) struct Entry {
 
 impl Entry {
     /// A network that starts from `start`.
-    pub(super) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
+    pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
         Self {
             variables,
             g: start.clone(),
@@ -53,19 +52,19 @@ impl Entry {
         }
     }
 
-    pub(super) fn owner(&self) -> Owner<'_> {
+    pub(crate) fn owner(&self) -> Owner<'_> {
         let rival = Rival { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
         Owner { variables: &self.variables, rival: self.quick.then_some(rival) }
     }
 
     /// Keeps what a descent of `look` reached.
-    pub(super) fn take(&mut self, look: Look, g: &[f64], reached: Reached) {
+    pub(crate) fn take(&mut self, look: Look, g: &[f64], reached: Reached) {
         self.g.copy_from_slice(g);
         (self.reached, self.look) = (reached, look);
     }
 
     /// Keeps what a descent of a further look reached when it is lower; says whether it is.
-    pub(super) fn offer(&mut self, look: Look, g: &[f64], reached: Reached) -> bool {
+    pub(crate) fn offer(&mut self, look: Look, g: &[f64], reached: Reached) -> bool {
         self.iterations += reached.iterations;
         let lower = reached.value < self.reached.value - TIE * self.reached.value.abs();
         if lower {

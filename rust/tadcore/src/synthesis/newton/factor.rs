@@ -14,21 +14,18 @@ use faer::linalg::cholesky::ldlt::factor;
 use faer::{MatMut, Par};
 
 #[cfg(target_arch = "x86_64")]
-mod tiles;
-
+use super::factor_avx2;
 use super::layout::{GROUP, Layout, packed};
+use super::tile::{Pivots, diagonal, tile};
 use crate::lanes::Number;
 use crate::width::Width;
 
 /// Unknowns from which faer's factorisation may be used.
 const LIBRARY_SIZE: usize = 512;
 
-/// A tile.
-type Tile<T> = [[T; GROUP]; GROUP];
-
 /// What may work on one matrix at a time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Means {
+pub(crate) struct Means {
     /// faer, on large matrices; its bits differ from those of the loops here.
     pub library: bool,
     /// Registers, with the same bits; only where the processor has AVX2 and FMA.
@@ -40,7 +37,7 @@ pub(super) struct Means {
 ///
 /// An unknown that a lane does not have (`layout`) has the unit row there.
 #[inline(always)]
-pub(super) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, means: Means, f: &mut [T]) -> (T::Mask, T) {
+pub(crate) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, means: Means, f: &mut [T]) -> (T::Mask, T) {
     let d = layout.len();
     if let (Some(h), Some(f)) = (T::alone(h), T::alone_mut(f)) {
         let (damping, used) = (damping.lane(0), layout.used());
@@ -65,7 +62,7 @@ fn factorise_alone(h: &[f64], damping: f64, used: usize, d: usize, width: Width,
     if width != Width::Baseline {
         debug_assert!(std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma"));
         // SAFETY: the other widths exist only where the processor said that it has AVX2 and FMA.
-        return unsafe { tiles::factorise(h, damping, used, d, f) };
+        return unsafe { factor_avx2::factorise(h, damping, used, d, f) };
     }
     debug_assert!(width == Width::Baseline);
     let mut pivots = Pivots::new();
@@ -113,89 +110,6 @@ fn factorise_columns<T: Number>(
     }
 }
 
-/// Factorises a tile of the diagonal, from which the columns before are taken off, and writes its part of the factor. The
-/// tile is left with C, and 1/D is the answer.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-fn diagonal<T: Number>(
-    on: &mut Tile<T>,
-    first: usize,
-    h: &[T],
-    damping: T,
-    active: [T::Mask; GROUP],
-    f: &mut [T],
-    d: usize,
-    pivots: &mut Pivots<T>,
-) -> [T; GROUP] {
-    let mut reciprocal = [T::splat(0.0); GROUP];
-    for j in 0..GROUP {
-        let original = h[packed(first + j) + first + j] + damping;
-        reciprocal[j] = T::splat(1.0) / pivots.check(on[j][j], original, active[j]);
-        for i in j + 1..GROUP {
-            let l = on[i][j] * reciprocal[j];
-            for k in j + 1..i + 1 {
-                on[i][k] = on[i][k].minus(l, on[k][j]);
-            }
-            f[(first + i) * d + first + j] = l;
-            f[(first + j) * d + first + i] = on[i][j];
-        }
-        f[(first + j) * d + first + j] = reciprocal[j];
-    }
-    reciprocal
-}
-
-/// The tile of H + μI at (`row`, `column`), less the products of the columns before it. On the diagonal, what lies above
-/// is not used.
-#[inline(always)]
-fn tile<T: Number>(h: &[T], row: usize, column: usize, damping: T, f: &[T], d: usize) -> Tile<T> {
-    let mut a = [[T::splat(0.0); GROUP]; GROUP];
-    for i in 0..GROUP {
-        let len = if row == column { i + 1 } else { GROUP };
-        a[i][..len].copy_from_slice(&h[packed(row + i) + column..][..len]);
-        if row == column {
-            a[i][i] = a[i][i] + damping;
-        }
-    }
-    let rows: [&[T]; GROUP] = std::array::from_fn(|i| &f[(row + i) * d..][..column]);
-    for k in 0..column {
-        let c = &f[k * d + column..][..GROUP];
-        for i in 0..GROUP {
-            let l = rows[i][k];
-            for j in 0..GROUP {
-                a[i][j] = a[i][j].minus(l, c[j]);
-            }
-        }
-    }
-    a
-}
-
-/// What the pivots said so far.
-struct Pivots<T> {
-    /// The lanes whose pivots were all sound.
-    ok: u16,
-    /// The first that was not, its sign turned.
-    lack: T,
-}
-
-impl<T: Number> Pivots<T> {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { ok: u16::MAX, lack: T::splat(0.0) }
-    }
-
-    /// The pivot to divide by: one where there is no unknown or the matrix is refused, whose lane goes on with the others
-    /// and is not used. A pivot is sound unless it is lost in the rounding of the diagonal entry that it comes from.
-    #[inline(always)]
-    fn check(&mut self, pivot: T, original: T, active: T::Mask) -> T {
-        let sound = T::bits((T::epsilon() * original.abs()).less(pivot)) & T::bits(T::splat(0.0).less(original));
-        let active = T::bits(active);
-        let refused = active & !sound;
-        self.lack = T::select(T::mask(self.ok & refused), T::splat(0.0) - pivot, self.lack);
-        self.ok &= !refused;
-        T::select(T::mask(sound & active), pivot, T::splat(1.0))
-    }
-}
-
 #[inline(never)]
 fn factorise_large(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> bool {
     for i in 0..d {
@@ -226,7 +140,7 @@ fn factorise_large(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]
 
 /// x := (**LD**)⁻¹x; the sum Σx²/D of **L**⁻¹x, that is xᵀ(H + μ**I**)⁻¹x of the x given.
 #[inline(always)]
-pub(super) fn forward<T: Number>(f: &[T], d: usize, x: &mut [T]) -> T {
+pub(crate) fn forward<T: Number>(f: &[T], d: usize, x: &mut [T]) -> T {
     let mut sum = T::splat(0.0);
     for first in (0..d).step_by(GROUP) {
         let (mut y, mut z) = ([T::splat(0.0); GROUP], [T::splat(0.0); GROUP]);
@@ -249,7 +163,7 @@ pub(super) fn forward<T: Number>(f: &[T], d: usize, x: &mut [T]) -> T {
 
 /// x := **L**⁻ᵀx: after [`forward`], the solution of (H + μ**I**)x = b.
 #[inline(always)]
-pub(super) fn back<T: Number>(f: &[T], d: usize, x: &mut [T]) {
+pub(crate) fn back<T: Number>(f: &[T], d: usize, x: &mut [T]) {
     for first in (0..d).step_by(GROUP).rev() {
         let l: [&[T]; GROUP] = std::array::from_fn(|i| &f[(first + i) * d..][..first + GROUP]);
         let (above, rest) = x.split_at_mut(first);
@@ -267,8 +181,8 @@ pub(super) fn back<T: Number>(f: &[T], d: usize, x: &mut [T]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::start::Variable;
     use super::*;
+    use crate::synthesis::newton::Variable;
 
     fn layout(d: usize) -> Layout<f64> {
         let variables: Vec<Variable> = (0..d).map(|entry| Variable { entry, own: 0, relative: false }).collect();

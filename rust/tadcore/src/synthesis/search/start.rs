@@ -7,22 +7,12 @@
 //! The canonical start is the orthogonal projection of the FNE rows on these spaces: the minimiser of the ‖S‖² terms
 //! alone. It depends on (t_k, topology) and on nothing else.
 
-use super::problem::Problem;
 use crate::network::Topology;
-
-/// One variable: the direction e_j, less e_i in a row that does not see the attacker.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Variable {
-    /// Position of (i, j) in the m × N gains.
-    pub entry: usize,
-    /// Position of (i, i), subtracted when `relative`.
-    pub own: usize,
-    /// Whether row i knows differences only.
-    pub relative: bool,
-}
+use crate::synthesis::newton::Variable;
+use crate::synthesis::theta::Problem;
 
 /// The variables of `topology`, row by row.
-pub(super) fn variables(topology: &Topology) -> Vec<Variable> {
+pub(crate) fn variables(topology: &Topology) -> Vec<Variable> {
     // At most all that are seen and, in each row, the player itself.
     let mut out = Vec::with_capacity(topology.edges() + topology.rows());
     let n = topology.size();
@@ -39,7 +29,7 @@ pub(super) fn variables(topology: &Topology) -> Vec<Variable> {
 }
 
 /// The paper's own variables, the entries of K_i: e_j − e_i for each player seen, e_i when the attacker is seen.
-pub(super) fn paper_variables(topology: &Topology) -> Vec<Variable> {
+pub(crate) fn paper_variables(topology: &Topology) -> Vec<Variable> {
     let mut out = Vec::new();
     let n = topology.size();
     for i in 0..topology.rows() {
@@ -51,7 +41,7 @@ pub(super) fn paper_variables(topology: &Topology) -> Vec<Variable> {
 }
 
 /// Writes the canonical start into `g` (m × N).
-pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
+pub(crate) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
     let n = problem.size;
     for i in 0..problem.rows {
         let relative = !topology.sees_attacker(i);
@@ -68,23 +58,6 @@ pub(super) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
         }
         if relative && count == 1.0 {
             g[i * n + i] = 0.0;
-        }
-    }
-}
-
-/// Makes the rows that know differences only sum to zero again, which rounding in single precision does not.
-pub(super) fn balance(g: &mut [f64], variables: &[Variable]) {
-    for row in variables.chunk_by(|a, b| a.own == b.own).filter(|row| row[0].relative) {
-        g[row[0].own] = -row.iter().map(|v| g[v.entry]).sum::<f64>();
-    }
-}
-
-/// Adds Σ x_v · direction_v to one network's gains.
-pub(super) fn advance(g: &mut [f64], variables: &[Variable], x: &[f64]) {
-    for (v, &x) in variables.iter().zip(x) {
-        g[v.entry] += x;
-        if v.relative {
-            g[v.own] -= x;
         }
     }
 }

@@ -5,13 +5,9 @@
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
 //! starts canonically, ends at a stationary point near its start, and does not look further.
 
-use super::layout::Layout;
-use super::newton::Objective;
-use super::objective::RealGains;
-use super::problem::Problem;
-use super::start::Variable;
-use super::tasks::{Limits, Reached};
 use crate::lanes::norm;
+use crate::synthesis::newton::{Layout, Limits, Objective, Reached, Variable};
+use crate::synthesis::theta::{Problem, RealGains};
 
 /// Values an Armijo test may look back at.
 const MEMORY: usize = 10;
@@ -19,7 +15,7 @@ const MEMORY: usize = 10;
 const HALVINGS: usize = 60;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
-pub(super) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
+pub(crate) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
     let mut objective = RealGains::<f64, 0>::new(&problem.double);
     let mut layout = Layout::default();
     layout.begin(g.len(), 1);

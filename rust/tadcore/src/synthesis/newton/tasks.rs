@@ -1,6 +1,6 @@
 //! Lists of descents, what belongs to each, and what it reached.
 
-use super::start::Variable;
+use super::variables::Variable;
 
 /// How a minimisation ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,7 +28,7 @@ impl Status {
 
 /// When to stop, and how far one step may go.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
+pub(crate) struct Limits {
     pub iterations: usize,
     /// Relative gradient norm aimed at.
     pub tolerance: f64,
@@ -40,7 +40,7 @@ pub(super) struct Limits {
 
 /// What a minimisation reached.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Reached {
+pub(crate) struct Reached {
     pub value: f64,
     pub gradient_norm: f64,
     /// What the gradient's norm is relative to.
@@ -50,7 +50,7 @@ pub(super) struct Reached {
 }
 
 impl Reached {
-    pub(super) fn new(value: f64, slope: f64, scale: f64, iterations: usize, limits: &Limits) -> Self {
+    pub(crate) fn new(value: f64, slope: f64, scale: f64, iterations: usize, limits: &Limits) -> Self {
         let relative = if slope == 0.0 { 0.0 } else { slope / scale };
         let status = match (relative <= limits.acceptable, iterations >= limits.iterations) {
             (true, _) => Status::Converged,
@@ -63,7 +63,7 @@ impl Reached {
 
 /// The best point known: a descent that only leads back to it, or cannot get below it, need not be finished.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rival<'a> {
+pub(crate) struct Rival<'a> {
     pub g: &'a [f64],
     pub value: f64,
     /// Distance at which a descent has come back to it.
@@ -72,14 +72,14 @@ pub(super) struct Rival<'a> {
 
 /// Whom descents belong to: a network with its variables.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Owner<'a> {
+pub(crate) struct Owner<'a> {
     pub variables: &'a [Variable],
     pub rival: Option<Rival<'a>>,
 }
 
 /// Descents to be made: where they start and, later, where they ended.
 #[derive(Debug, Default)]
-pub(super) struct Tasks {
+pub(crate) struct Tasks {
     /// Entries of one network's gains, mN.
     width: usize,
     /// Entries of a point: `width`, or twice as many.
@@ -95,7 +95,7 @@ pub(super) struct Tasks {
 
 impl Tasks {
     /// Empties the list for points of `copies` times `width` entries.
-    pub(super) fn clear(&mut self, width: usize, copies: usize) {
+    pub(crate) fn clear(&mut self, width: usize, copies: usize) {
         (self.width, self.length) = (width, copies * width);
         self.points.clear();
         self.whose.clear();
@@ -105,7 +105,7 @@ impl Tasks {
     }
 
     /// Adds a descent of `owner`'s, and gives its start to be written.
-    pub(super) fn add(&mut self, owner: usize, complex: bool, scale: f64) -> &mut [f64] {
+    pub(crate) fn add(&mut self, owner: usize, complex: bool, scale: f64) -> &mut [f64] {
         let from = self.points.len();
         self.points.resize(from + self.length, 0.0);
         self.whose.push((owner, complex, scale));
@@ -115,41 +115,41 @@ impl Tasks {
         &mut self.points[from..]
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.whose.len()
     }
 
-    pub(super) fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    pub(super) fn owner(&self, task: usize) -> usize {
+    pub(crate) fn owner(&self, task: usize) -> usize {
         self.whose[task].0
     }
 
     /// Whether the gains are complex, and the scale of their gradient.
-    pub(super) fn kind(&self, task: usize) -> (bool, f64) {
+    pub(crate) fn kind(&self, task: usize) -> (bool, f64) {
         (self.whose[task].1, self.whose[task].2)
     }
 
-    pub(super) fn point(&self, task: usize) -> &[f64] {
+    pub(crate) fn point(&self, task: usize) -> &[f64] {
         &self.points[task * self.length..][..self.length]
     }
 
-    pub(super) fn point_mut(&mut self, task: usize) -> &mut [f64] {
+    pub(crate) fn point_mut(&mut self, task: usize) -> &mut [f64] {
         &mut self.points[task * self.length..][..self.length]
     }
 
-    pub(super) fn end(&mut self, task: usize, reached: Reached, settled: bool) {
+    pub(crate) fn end(&mut self, task: usize, reached: Reached, settled: bool) {
         (self.reached[task], self.settled[task]) = (reached, settled);
     }
 
-    pub(super) fn settled(&self, task: usize) -> bool {
+    pub(crate) fn settled(&self, task: usize) -> bool {
         self.settled[task]
     }
 
     /// Drops the descents that `keep` does not name; none of them has been made.
-    pub(super) fn retain(&mut self, keep: &[bool]) {
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
         let mut kept = 0;
         for task in (0..keep.len()).filter(|&task| keep[task]) {
             self.whose[kept] = self.whose[task];
@@ -163,15 +163,15 @@ impl Tasks {
         self.settled.truncate(kept);
     }
 
-    pub(super) fn reached(&self, task: usize) -> Reached {
+    pub(crate) fn reached(&self, task: usize) -> Reached {
         self.reached[task]
     }
 
-    pub(super) fn certify(&mut self, task: usize) {
+    pub(crate) fn certify(&mut self, task: usize) {
         self.certified[task] = true;
     }
 
-    pub(super) fn certified(&self, task: usize) -> bool {
+    pub(crate) fn certified(&self, task: usize) -> bool {
         self.certified[task]
     }
 }

@@ -5,16 +5,10 @@
 //! | exp(Cδ) | [`Shelf::matrices`] from `slot × stride` | by columns, each padded with zeros to [`padded`] rows |
 //! | 𝒜 | the words of a [`Topology`](crate::network::Topology) | the key |
 //!
-//! Up to [`DIRECT_BITS`] bits a key is an index itself (n ≤ 3 in I1, n ≤ 2 in I2): 8 KiB an instant, which stays in the
-//! first cache while a whole chunk of trials passes. Up to 64 bits an open-addressing table, beyond a map of words.
-//! Slot 0 is never a topology's: a lookup that gives 0 found nothing.
+//! Where an entry lies is its slot ([`super::index`]). Slot 0 is never a topology's: a lookup that gives 0 found nothing.
 
-use std::collections::HashMap;
-
+use super::index::Index;
 use crate::width::prefetch;
-
-/// Bits of a topology up to which it is its own index.
-pub(crate) const DIRECT_BITS: usize = 12;
 
 /// Bytes of a cache line.
 const LINE: usize = 64;
@@ -27,130 +21,6 @@ const MATRIX_LINE: usize = LINE / size_of::<f64>();
 #[must_use]
 pub(crate) fn padded(n: usize) -> usize {
     n.next_multiple_of(4)
-}
-
-/// Where the entry of a topology lies.
-#[derive(Debug)]
-pub(crate) enum Index {
-    /// slot = table[key]; empty until the first entry.
-    Direct(Vec<u16>),
-    /// Keys up to 64 bits.
-    Hashed(OpenTable),
-    /// Keys of more words.
-    Wide(HashMap<Box<[u64]>, u32>),
-}
-
-impl Index {
-    /// An empty index for keys of `bits`, by the key itself where that is small.
-    fn new(bits: usize, direct: bool) -> Self {
-        match bits {
-            0..=DIRECT_BITS if direct => Self::Direct(Vec::new()),
-            0..=64 => Self::Hashed(OpenTable::default()),
-            _ => Self::Wide(HashMap::new()),
-        }
-    }
-
-    /// The slot of a key, 0 where there is none.
-    #[inline(always)]
-    fn find(&self, words: &[u64]) -> u32 {
-        match self {
-            Self::Direct(slots) => slots.get(words[0] as usize).map_or(0, |&slot| u32::from(slot)),
-            Self::Hashed(table) => table.find(words[0]),
-            Self::Wide(map) => map.get(words).copied().unwrap_or(0),
-        }
-    }
-
-    fn insert(&mut self, words: &[u64], slot: usize, bits: usize) {
-        match self {
-            Self::Direct(slots) => {
-                if slots.is_empty() {
-                    slots.resize(1 << bits, 0);
-                }
-                slots[words[0] as usize] = slot as u16;
-            }
-            Self::Hashed(table) => table.insert(words[0], slot as u32),
-            Self::Wide(map) => {
-                map.insert(words.into(), slot as u32);
-            }
-        }
-    }
-
-    fn clear(&mut self) {
-        match self {
-            Self::Direct(slots) => slots.fill(0),
-            Self::Hashed(table) => table.clear(),
-            Self::Wide(map) => map.clear(),
-        }
-    }
-
-    /// Bytes that one more key takes, the table's own memory with the first.
-    fn entry_bytes(&self, bits: usize) -> usize {
-        match self {
-            Self::Direct(slots) if slots.is_empty() => size_of::<u16>() << bits,
-            Self::Direct(_) => 0,
-            Self::Hashed(_) => 4 * size_of::<(u64, u32)>(),
-            Self::Wide(_) => 2 * (size_of::<(Box<[u64]>, u32)>() + 8 * bits.div_ceil(64)),
-        }
-    }
-}
-
-/// Open addressing with linear probing, at most half full; slot 0 marks a free place.
-#[derive(Debug, Default)]
-pub(crate) struct OpenTable {
-    places: Vec<(u64, u32)>,
-    held: usize,
-    shift: u32,
-}
-
-impl OpenTable {
-    #[inline(always)]
-    fn home(key: u64, shift: u32) -> usize {
-        // Fibonacci hashing: the high bits of a product with 2⁶⁴/φ are well mixed.
-        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> shift) as usize
-    }
-
-    #[inline(always)]
-    fn find(&self, key: u64) -> u32 {
-        if self.places.is_empty() {
-            return 0;
-        }
-        let mask = self.places.len() - 1;
-        let mut at = Self::home(key, self.shift);
-        loop {
-            let (held, slot) = self.places[at & mask];
-            if slot == 0 || held == key {
-                return slot;
-            }
-            at += 1;
-        }
-    }
-
-    fn insert(&mut self, key: u64, slot: u32) {
-        self.held += 1;
-        if 2 * (self.held + 1) > self.places.len() {
-            let size = (2 * self.places.len()).max(16);
-            let old = std::mem::replace(&mut self.places, vec![(0, 0); size]);
-            self.shift = 64 - size.trailing_zeros();
-            for (key, slot) in old.into_iter().filter(|&(_, slot)| slot != 0) {
-                self.place(key, slot);
-            }
-        }
-        self.place(key, slot);
-    }
-
-    fn clear(&mut self) {
-        self.places.fill((0, 0));
-        self.held = 0;
-    }
-
-    fn place(&mut self, key: u64, slot: u32) {
-        let mask = self.places.len() - 1;
-        let mut at = Self::home(key, self.shift);
-        while self.places[at & mask].1 != 0 {
-            at += 1;
-        }
-        self.places[at & mask] = (key, slot);
-    }
 }
 
 /// The transitions of one instant.
@@ -186,7 +56,7 @@ impl Shelf {
         self.models.find(words)
     }
 
-    /// The slots by key of a shelf with at most [`DIRECT_BITS`] bits, for sweeps that know their size.
+    /// The slots by key of a shelf with at most [`DIRECT_BITS`](super::index::DIRECT_BITS) bits, for sweeps that know their size.
     #[inline(always)]
     pub(crate) fn direct(&self) -> &[u16] {
         match &self.index {

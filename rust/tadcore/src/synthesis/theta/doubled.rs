@@ -17,14 +17,13 @@
 //!
 //! The vector is laid out A first, then B, m × N each.
 
-use super::layout::{Form, Slot};
-use super::newton::Objective;
-use super::objective::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
-use super::parts::Parts;
+use super::coefficients::Parts;
+use super::real::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
 use crate::lanes::{Number, dot, norm, sum_of_squares, take};
+use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over doubled gains.
-pub(super) struct Doubled<'a, T: Number, const N: usize> {
+pub(crate) struct Doubled<'a, T: Number, const N: usize> {
     problem: &'a Parts<T::Scalar>,
     /// s: 1 for complex gains, 0 for stacked ones.
     complex: T,
@@ -45,7 +44,7 @@ pub(super) struct Doubled<'a, T: Number, const N: usize> {
 
 impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
     #[inline(always)]
-    pub(super) fn new(problem: &'a Parts<T::Scalar>) -> Self {
+    pub(crate) fn new(problem: &'a Parts<T::Scalar>) -> Self {
         let (n, m, groups) = (problem.size, problem.rows, problem.coupling.len());
         let zero = T::splat(0.0);
         Self {

@@ -4,21 +4,15 @@
 //! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
 //! leave the first cache side by side, and go one at a time.
 
-use super::dense::{self, Means};
-use super::doubled::Doubled;
-use super::newton::{Objective, minimise};
-use super::objective::{Certificate, RealGains};
-use super::parts::Parts;
-use super::problem::Problem;
-use super::tasks::{Limits, Owner, Tasks};
-use super::workspace::Workspace;
 use crate::lanes::Number;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Eight, Eight32, Sixteen32, Wide, Wide32};
+use crate::synthesis::newton::{Limits, Means, Objective, Owner, Tasks, Workspace, factorise, minimise};
+use crate::synthesis::theta::{Certificate, Doubled, Parts, Problem, RealGains};
 use crate::width::Width;
 
 /// N up to which there is a version with constant loop bounds.
-pub(super) const CONSTANT_UP_TO: usize = 8;
+pub(crate) const CONSTANT_UP_TO: usize = 8;
 /// N up to which descents go side by side.
 pub(crate) const SIDE_BY_SIDE_UP_TO: usize = 6;
 /// Descents from which they go side by side.
@@ -28,7 +22,7 @@ const CERTIFICATE_ROUNDING: f64 = 1e-12;
 
 /// In which gains a list descends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// In the gains themselves.
     Real,
     /// In the gains themselves; each end point is then tried for the certificate.
@@ -41,7 +35,7 @@ pub(super) enum Kind {
 
 /// The scratch of the widths in use.
 #[derive(Debug)]
-pub(super) struct Engine {
+pub(crate) struct Engine {
     width: Width,
     one: Workspace<f64>,
     one32: Workspace<f32>,
@@ -74,7 +68,7 @@ struct List<'a> {
 
 impl Engine {
     /// An engine of a width that the processor has.
-    pub(super) fn of(width: Width) -> Self {
+    pub(crate) fn of(width: Width) -> Self {
         Self {
             width,
             one: Workspace::default(),
@@ -93,7 +87,7 @@ impl Engine {
     }
 
     /// Makes the descents of `tasks`.
-    pub(super) fn run<const N: usize>(
+    pub(crate) fn run<const N: usize>(
         &mut self,
         kind: Kind,
         problem: &Problem,
@@ -175,7 +169,7 @@ const fn side_by_side(n: usize) -> bool {
 }
 
 /// The problem in single precision: where descents go side by side, twice as many fit a register.
-pub(super) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
+pub(crate) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
     problem.single.as_ref().filter(|_| side_by_side(N))
 }
 
@@ -279,7 +273,7 @@ fn certify<T: Number, const N: usize>(
         w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian);
         let largest = w.layout.largest(&w.hessian);
         let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
-        let (definite, _) = dense::factorise(&w.hessian, allowance, &w.layout, means, &mut w.factor);
+        let (definite, _) = factorise(&w.hessian, allowance, &w.layout, means, &mut w.factor);
         let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
         for task in first..last {
             if proved >> (task - first) & 1 == 1 {

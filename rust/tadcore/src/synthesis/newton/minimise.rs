@@ -10,14 +10,14 @@
 //! depend on its neighbours, nor on whether it had any: sums over the unknowns, among which a lane finds zeros for those
 //! of its neighbours, go in order.
 
-use super::dense::{self, Means};
+use super::factor::{self, Means};
 use super::layout::{Form, packed};
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
 use crate::lanes::{Number, dot_in_order, take};
 
 /// A function of gains laid out as one vector of `width` entries, and the form that its Hessian is.
-pub(super) trait Objective<T: Number>: Form<T> {
+pub(crate) trait Objective<T: Number>: Form<T> {
     fn width(&self) -> usize;
     /// Tells a lane which kind of doubled gains it is to hold, and the scale of their gradient.
     fn set_lane(&mut self, _lane: usize, _complex: bool, _scale: f64) {}
@@ -76,7 +76,7 @@ fn rounding<T: Number>(value: T, scale: T) -> T {
 
 /// Descends from every point of `tasks` along the variables of its owner, and leaves each end point in its place.
 #[inline(always)]
-pub(super) fn minimise<T: Number, O: Objective<T>>(
+pub(crate) fn minimise<T: Number, O: Objective<T>>(
     objective: &mut O,
     tasks: &mut Tasks,
     owners: &[Owner],
@@ -160,7 +160,7 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
             }
             noise = rounding(s.value, noise_scale);
             raise = (T::splat(4.0) * s.damping).or_larger(T::splat(FIRST_DAMPING) * largest).or_larger(T::least());
-            let (definite, lack) = dense::factorise(hessian, s.damping, layout, means, factor);
+            let (definite, lack) = factor::factorise(hessian, s.damping, layout, means, factor);
             let definite = T::bits(definite) & old;
             failed = old & !definite;
             // An indefinite matrix lacks about what its pivot did.
@@ -170,15 +170,15 @@ pub(super) fn minimise<T: Number, O: Objective<T>>(
                 for (step, &g) in step.iter_mut().zip(gradient.iter()) {
                     *step = zero - g;
                 }
-                dense::forward(factor, d, step);
-                dense::back(factor, d, step);
+                factor::forward(factor, d, step);
+                factor::back(factor, d, step);
                 let length2 = dot_in_order(step, step);
                 let short = T::bits(length2.at_most(T::splat(limits.longest * limits.longest)));
                 let long = definite & !short;
                 if long != 0 {
                     // Moré and Sorensen's step towards the μ at which the length is right: Newton on its reciprocal.
                     w_step.copy_from_slice(step);
-                    let slope = dense::forward(factor, d, w_step);
+                    let slope = factor::forward(factor, d, w_step);
                     let length = length2.sqrt();
                     let excess = length * T::splat(1.0 / (AIM * limits.longest)) - T::splat(1.0);
                     let better = s.damping + length2 / slope * excess;

@@ -12,13 +12,12 @@
 //! form is positive semidefinite on the variables, G* is a *global* minimiser. It is the Hessian without its
 //! Gauss–Newton part: one more factorisation proves what no number of restarts can.
 
-use super::layout::{Form, Slot};
-use super::newton::Objective;
-use super::parts::Parts;
+use super::coefficients::Parts;
 use crate::lanes::{Number, Scalar, dot, norm, sum_of_squares, take};
+use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over gains, for one network or several side by side. `N` is the size, 0 when it is known only at run time.
-pub(super) struct RealGains<'a, T: Number, const N: usize> {
+pub(crate) struct RealGains<'a, T: Number, const N: usize> {
     problem: &'a Parts<T::Scalar>,
     /// X at the point last evaluated, N × N.
     x: Vec<T>,
@@ -34,7 +33,7 @@ pub(super) struct RealGains<'a, T: Number, const N: usize> {
 
 impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
     #[inline(always)]
-    pub(super) fn new(problem: &'a Parts<T::Scalar>) -> Self {
+    pub(crate) fn new(problem: &'a Parts<T::Scalar>) -> Self {
         let (n, m) = (problem.size, problem.rows);
         let zero = T::splat(0.0);
         Self {
@@ -82,7 +81,7 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
 
 /// h := q − relative·own, rows of a constant matrix.
 #[inline(always)]
-pub(super) fn constant<T: Number>(h: &mut [T], q: &[T::Scalar], own: &[T::Scalar], v: &Slot<T>) {
+pub(crate) fn constant<T: Number>(h: &mut [T], q: &[T::Scalar], own: &[T::Scalar], v: &Slot<T>) {
     if v.differs {
         for ((h, &q), &own) in h.iter_mut().zip(q).zip(own) {
             *h = T::all(q).minus(v.relative, T::all(own));
@@ -96,13 +95,13 @@ pub(super) fn constant<T: Number>(h: &mut [T], q: &[T::Scalar], own: &[T::Scalar
 
 /// A row's product with the direction e_a − relative·e_i.
 #[inline(always)]
-pub(super) fn along<T: Number>(row: &[T], a: usize, i: usize, v: &Slot<T>) -> T {
+pub(crate) fn along<T: Number>(row: &[T], a: usize, i: usize, v: &Slot<T>) -> T {
     if v.differs { row[a].minus(v.relative, row[i]) } else { row[a] }
 }
 
 /// h += x · (e_a − relative·e_i).
 #[inline(always)]
-pub(super) fn add_unit<T: Number>(h: &mut [T], a: usize, i: usize, v: &Slot<T>, x: T) {
+pub(crate) fn add_unit<T: Number>(h: &mut [T], a: usize, i: usize, v: &Slot<T>, x: T) {
     h[a] = h[a] + x;
     if v.differs {
         h[i] = h[i].minus(v.relative, x);
@@ -111,7 +110,7 @@ pub(super) fn add_unit<T: Number>(h: &mut [T], a: usize, i: usize, v: &Slot<T>, 
 
 /// h += factor · (x_a − relative·x_i), rows of a matrix x.
 #[inline(always)]
-pub(super) fn add_row<T: Number>(h: &mut [T], factor: T, x: &[T], n: usize, a: usize, i: usize, v: &Slot<T>) {
+pub(crate) fn add_row<T: Number>(h: &mut [T], factor: T, x: &[T], n: usize, a: usize, i: usize, v: &Slot<T>) {
     let (xa, xi) = (&x[a * n..][..n], &x[i * n..][..n]);
     for b in 0..n {
         let x = if v.differs { xa[b].minus(v.relative, xi[b]) } else { xa[b] };
@@ -127,7 +126,7 @@ impl<T: Number, const N: usize> Form<T> for RealGains<'_, T, N> {
 }
 
 /// The form whose definiteness certifies the point last evaluated: its blocks are 4γ₁ δ_ij r_i X + Q_ij.
-pub(super) struct Certificate<'a, 'b, T: Number, const N: usize>(pub &'a RealGains<'b, T, N>);
+pub(crate) struct Certificate<'a, 'b, T: Number, const N: usize>(pub &'a RealGains<'b, T, N>);
 
 impl<T: Number, const N: usize> Form<T> for Certificate<'_, '_, T, N> {
     #[inline(always)]
@@ -226,7 +225,7 @@ impl<T: Number, const N: usize> Objective<T> for RealGains<'_, T, N> {
 
 /// E = WΔ + σ(WΔ)ᵀ, with w and Δ by rows.
 #[inline(always)]
-pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[T::Scalar], delta: &[T], sign: T) {
+pub(crate) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[T::Scalar], delta: &[T], sign: T) {
     for (i, (w, d)) in w.chunks_exact(n).zip(delta.chunks_exact(n)).enumerate() {
         for (e, &w) in e.chunks_exact_mut(n).zip(w) {
             let factor = T::all(w);
@@ -246,7 +245,7 @@ pub(super) fn symmetric_product<T: Number>(e: &mut [T], n: usize, w: &[T::Scalar
 
 /// row += factor · (x E) for a row x and a matrix E.
 #[inline(always)]
-pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T], e: &[T]) {
+pub(crate) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T], e: &[T]) {
     for (e, &x) in e.chunks_exact(n).zip(x) {
         let scale = factor * x;
         for b in 0..n {
@@ -257,7 +256,7 @@ pub(super) fn add_product<T: Number>(row: &mut [T], n: usize, factor: T, x: &[T]
 
 /// row += 4 · (w E) for a row w of the problem.
 #[inline(always)]
-pub(super) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[T::Scalar], e: &[T]) {
+pub(crate) fn add_weighted<T: Number>(row: &mut [T], n: usize, w: &[T::Scalar], e: &[T]) {
     for (e, &w) in e.chunks_exact(n).zip(w) {
         let scale = T::all(T::Scalar::of(4.0) * w);
         for b in 0..n {

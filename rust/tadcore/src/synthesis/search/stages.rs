@@ -1,38 +1,19 @@
-//! From the canonical start to the global minimum: which descents are made, and when no more are needed.
-//!
-//! 1. Newton from the canonical start. Most entries end here: the certificate of `objective` proves the
-//!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
-//! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a fixed
-//!    pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes back
-//!    to the real gains A, A + B and A − B, from where Newton finishes; so it does from the canonical start without one
-//!    row at a time.
-//! 3. A last look: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG does
-//!    not see the sign of a row, so minima come in families that differ by signs.
-//!
-//! Most descents of the further looks lead back to the best point or to a higher one. Where descents go side by side
-//! they are made in single precision first, twice as many to a register, and what that leaves undecided goes on in
-//! double from there; doubled gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
-//!
-//! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. The networks of one instant
-//! go through these stages together, their descents side by side; the rival that lets a descent end early is the best
-//! point before its stage, so no network's answer depends on which others were asked for. Everything here is a
-//! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
+//! The stages of the search for one list of networks; [`super`] says what they are.
 
-use super::engine::{self, Engine, Kind};
-use super::entry::{BACK, Entry, Look};
-use super::problem::Problem;
-use super::start;
-use super::tasks::{Limits, Owner, Tasks};
+use super::candidate::{BACK, Entry, Look};
+use super::dispatch::{self, Engine, Kind};
 use crate::lanes::norm;
+use crate::synthesis::newton::{Limits, Owner, Tasks, advance, balance};
+use crate::synthesis::theta::Problem;
 
 /// Size of the second part B at the start, relative to ‖F‖.
 const FAR: f64 = 1.0;
 /// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
-const LONGEST_STEP: f64 = 0.3;
+pub(crate) const LONGEST_STEP: f64 = 0.3;
 /// Relative gradient at which a second or third look has found its basin.
-const BASIN: f64 = 1e-4;
+pub(crate) const BASIN: f64 = 1e-4;
 /// Steps of a second or third look.
-const LOOK_ITERATIONS: usize = 300;
+pub(crate) const LOOK_ITERATIONS: usize = 300;
 /// Steps of a descent in single precision, and the relative gradient at which it is left undecided.
 const SCOUT_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
@@ -47,7 +28,7 @@ const QUICK: usize = 30;
 const POLISH: usize = 50;
 
 /// What a search needs besides its entries.
-pub(super) struct Search<'a> {
+pub(crate) struct Search<'a> {
     pub problem: &'a Problem,
     pub limits: Limits,
     pub engine: &'a mut Engine,
@@ -58,7 +39,7 @@ pub(super) struct Search<'a> {
 
 impl Search<'_> {
     /// Finds the global minimum of Θ for every entry.
-    pub(super) fn run<const N: usize>(&mut self, entries: &mut [Entry]) {
+    pub(crate) fn run<const N: usize>(&mut self, entries: &mut [Entry]) {
         self.start(1);
         for (e, entry) in entries.iter().enumerate() {
             self.tasks.add(e, false, 0.0).copy_from_slice(&entry.start);
@@ -164,7 +145,7 @@ impl Search<'_> {
                 for (x, (a, b)) in point.iter_mut().zip(a.iter().zip(b)) {
                     *x = a + sign * b;
                 }
-                start::balance(point, &entries[e].variables);
+                balance(point, &entries[e].variables);
                 looks.push(look);
             }
             if look == Look::Stacked {
@@ -199,7 +180,7 @@ impl Search<'_> {
                 entry.iterations += scouts.reached(scout).iterations;
                 let point = tasks.point_mut(task);
                 point.copy_from_slice(scouts.point(scout));
-                start::balance(point, &entry.variables);
+                balance(point, &entry.variables);
                 !scouts.settled(scout)
             })
             .collect();
@@ -210,7 +191,7 @@ impl Search<'_> {
 
     /// Makes the listed descents and keeps what is lower; which entries that changed.
     fn finish<const N: usize>(&mut self, entries: &mut [Entry], mut looks: Vec<Look>) -> Vec<usize> {
-        if engine::single::<N>(self.problem).is_some() {
+        if dispatch::single::<N>(self.problem).is_some() {
             self.scout::<N>(entries, &mut looks);
         }
         let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
@@ -240,7 +221,7 @@ impl Search<'_> {
     }
 
     /// Tries the certificate at the best point of each of `which`.
-    pub(super) fn certify<const N: usize>(&mut self, entries: &mut [Entry], which: &[usize]) {
+    pub(crate) fn certify<const N: usize>(&mut self, entries: &mut [Entry], which: &[usize]) {
         if which.is_empty() {
             return;
         }
@@ -268,14 +249,11 @@ fn scale_rows(n: usize, from: &[f64], rows: &[usize], factor: f64, out: &mut [f6
 
 /// Writes the canonical start with a second part B along the variables, in a fixed pattern as large as the gains F and
 /// without symmetry: the golden angle spreads it.
-fn far_start(entry: &Entry, scale: f64, out: &mut [f64]) {
+pub(crate) fn far_start(entry: &Entry, scale: f64, out: &mut [f64]) {
     let (a, b) = out.split_at_mut(entry.start.len());
     a.copy_from_slice(&entry.start);
     let unknowns = entry.variables.len();
     let size = FAR * scale / (unknowns as f64).sqrt();
     let pattern: Vec<f64> = (0..unknowns).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()).collect();
-    start::advance(b, &entry.variables, &pattern);
+    advance(b, &entry.variables, &pattern);
 }
-
-#[cfg(test)]
-mod tests;

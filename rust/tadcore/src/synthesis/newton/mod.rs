@@ -1,0 +1,32 @@
+//! Many small descents side by side: Newton's method on functions of gains that are given by their derivatives.
+//!
+//! Nothing here knows of games, networks or Θ. In this order, each file using those above it:
+//!
+//! | module | what it knows |
+//! |---|---|
+//! | `variables` | directions in the space of the gains |
+//! | `layout` | the unknowns of several descents side by side; forms restricted to them |
+//! | `tile`, `factor`, `factor_avx2` | factorisation of small symmetric matrices, and the solves that go with it |
+//! | `tasks` | lists of descents: where they start, what they reached |
+//! | `workspace` | scratch memory |
+//! | `minimise` | the descents |
+
+mod factor;
+#[cfg(target_arch = "x86_64")]
+mod factor_avx2;
+mod layout;
+mod minimise;
+mod tasks;
+mod tile;
+mod variables;
+mod workspace;
+
+pub(crate) use factor::{Means, factorise};
+#[cfg(test)]
+pub(crate) use layout::packed;
+pub(crate) use layout::{Form, Layout, Slot};
+pub(crate) use minimise::{Objective, minimise};
+pub use tasks::Status;
+pub(crate) use tasks::{Limits, Owner, Reached, Rival, Tasks};
+pub(crate) use variables::{Variable, advance, balance};
+pub(crate) use workspace::Workspace;
