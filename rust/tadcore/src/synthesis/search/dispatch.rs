@@ -123,7 +123,7 @@ impl Engine {
         // Every width gives the same bits; where the processor has only the target's, one version for all sizes will do.
         #[cfg(target_arch = "x86_64")]
         if self.width == Width::Baseline {
-            return run::<f64, 0>(parts, list, &mut self.one);
+            return any_size(parts, list, &mut self.one);
         }
         debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
         // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
@@ -155,7 +155,7 @@ impl Engine {
         }
         #[cfg(target_arch = "x86_64")]
         if self.width == Width::Baseline {
-            return run::<f32, 0>(parts, list, &mut self.one32);
+            return any_size(parts, list, &mut self.one32);
         }
         debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
         // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
@@ -173,13 +173,28 @@ pub(crate) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
     problem.single.as_ref().filter(|_| side_by_side(N))
 }
 
+/// One descent after another by the target's own instructions, one version for all sizes.
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+fn any_size<T: Number>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    run::<T, 0>(parts, list, w);
+}
+
 /// One descent after another.
 ///
 /// # Safety
 /// On x86-64 the processor must have AVX2 and FMA.
 #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
 unsafe fn one<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<f64>) {
-    run::<f64, N>(parts, list, w);
+    if list.kind != Kind::Doubled {
+        descend::<f64, N>(parts, list, w);
+    } else if const { side_by_side(N) } {
+        // Only where single precision cannot hold the problem.
+        // SAFETY: as promised to this function.
+        unsafe { one::<0>(parts, list, w) }
+    } else {
+        descend_doubled::<f64, N>(parts, list, w);
+    }
 }
 
 /// The same in single precision: seldom enough for one version for all sizes.
