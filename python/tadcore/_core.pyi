@@ -5,9 +5,15 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__"]
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "simd"]
 
 __version__: str
+
+def simd() -> Literal["baseline", "avx2", "avx512"]:
+    """The vector instructions in use: the widest that this processor has, or those that TADCORE_SIMD chose.
+
+    TadcoreError where TADCORE_SIMD names none, or some that this processor does not have.
+    """
 
 @final
 class Game:

@@ -256,3 +256,45 @@ fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
         assert_eq!(load(&bytes[..bytes.len() - 8]), Err(TableError::Damaged));
     }
 }
+
+/// What a process of this environment does: refused, or the width in use and how the trials of one batch end.
+#[test]
+#[ignore = "runs in a process of its own, from the test below"]
+fn what_this_process_does() {
+    match bank::paper_game(Interaction::I1, 1.0) {
+        Err(error) => println!("refused: {error}"),
+        Ok(_) => {
+            let case = case(Interaction::I1, 3, 2, 100, true, DEFAULT_TABLE_BYTES);
+            println!("used: {} {:?}", tadcore::width::in_use().expect("a width"), case.play(1));
+        }
+    }
+}
+
+/// Where the environment asks for a width that cannot be had, no game is made; every other one ends all trials alike.
+#[test]
+fn the_environment_chooses_a_width_or_is_refused() {
+    let told = |value: &str| {
+        let program = std::env::current_exe().expect("this program");
+        let test = ["--exact", "what_this_process_does", "--ignored", "--nocapture"];
+        let output = std::process::Command::new(program).args(test).env("TADCORE_SIMD", value).output();
+        let text = String::from_utf8(output.expect("a process").stdout).expect("UTF-8");
+        let line = text.lines().find_map(|line| line.split_once("used: ").or_else(|| line.split_once("refused: ")));
+        line.unwrap_or_else(|| panic!("{text}")).1.to_owned()
+    };
+    let refused = told("sse2");
+    let (said, widths) = refused.split_once("; this processor has ").expect("the widths of the processor");
+    let rule = "it must be baseline, avx2 or avx512 (or empty: the widest)";
+    assert_eq!(said, format!("TADCORE_SIMD is \"sse2\", but {rule}"));
+    let widths: Vec<&str> = widths.split(", ").collect();
+    let ends = |value: &str| told(value).split_once(' ').map(|(used, ends)| (used.to_owned(), ends.to_owned()));
+    let widest = ends("").expect("the widest");
+    assert_eq!(widest.0, widths[widths.len() - 1]);
+    for name in ["baseline", "avx2", "avx512"] {
+        if widths.contains(&name) {
+            assert_eq!(ends(name), Some((name.to_owned(), widest.1.clone())));
+        } else {
+            let only = widths.join(", ");
+            assert_eq!(told(name), format!("TADCORE_SIMD is {name:?}, but this processor has only {only}"));
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
-use tadcore::error::{EquilibriumError, GameError, RunError};
+use tadcore::error::{EquilibriumError, GameError, RunError, SimdError};
 use tadcore::game::Game;
 
 fn raise(py: Python<'_>, class: &str, arguments: impl for<'py> pyo3::call::PyCallArgs<'py>) -> PyErr {
@@ -14,7 +14,7 @@ fn raise(py: Python<'_>, class: &str, arguments: impl for<'py> pyo3::call::PyCal
     }
 }
 
-/// `ScenarioError` naming field, value and rule.
+/// `ScenarioError` naming field, value and rule; `TadcoreError` if it is the environment's fault.
 pub(crate) fn game(py: Python<'_>, error: GameError) -> PyErr {
     match error {
         GameError::Value { field, value, rule } => raise(py, "ScenarioError", (field, value, rule)),
@@ -30,7 +30,13 @@ pub(crate) fn game(py: Python<'_>, error: GameError) -> PyErr {
             let rule = format!("a divisor of the horizon {horizon}");
             raise(py, "ScenarioError", ("step", step, rule))
         }
+        GameError::Simd(error) => simd(py, &error),
     }
+}
+
+/// `TadcoreError`: no scenario is to blame.
+pub(crate) fn simd(py: Python<'_>, error: &SimdError) -> PyErr {
+    raise(py, "TadcoreError", (error.to_string(),))
 }
 
 /// `NoEquilibriumError` with its escape time.

@@ -25,6 +25,12 @@ mod _core {
     use super::record::Record;
     use super::*;
 
+    /// The vector instructions in use.
+    #[pyfunction]
+    fn simd(py: Python<'_>) -> PyResult<&'static str> {
+        tadcore::width::in_use().map_err(|error| errors::simd(py, &error))
+    }
+
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))

@@ -38,7 +38,7 @@
 //! | layer | what it knows |
 //! |---|---|
 //! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
-//! | `width` | loops compiled for each vector width |
+//! | [`width`] | loops compiled for each vector width |
 //! | `lanes` | one number, or several side by side in a register |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
@@ -71,4 +71,4 @@ pub mod policy;
 pub mod riccati;
 pub mod simulation;
 pub mod synthesis;
-mod width;
+pub mod width;

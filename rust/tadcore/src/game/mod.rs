@@ -24,6 +24,7 @@ pub(crate) mod validation;
 pub use grid::Grid;
 
 use crate::error::GameError;
+use crate::width;
 
 /// Which of the paper's two interactions is played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -88,8 +89,9 @@ impl Game {
     /// A game, once every weight and the grid have been checked.
     ///
     /// # Errors
-    /// [`GameError`] naming the first field that breaks its rule.
+    /// [`GameError`] naming the first field that breaks its rule, or `TADCORE_SIMD` if that cannot be followed.
     pub fn new(interaction: Interaction, weights: Weights, grid: Grid) -> Result<Self, GameError> {
+        width::in_use()?;
         validation::weights(interaction, weights.r_d.len(), &weights)?;
         validation::size(interaction, weights.r_d.len(), grid.steps())?;
         Ok(Self { interaction, weights, grid })
