@@ -16,10 +16,10 @@ from collections import Counter
 import numpy as np
 
 import tadcore
-from tadcore.verification._matrices import matrices_of
-from tadcore.verification.bounds import bound_theta
-from tadcore.verification.gains import multistart
-from tadcore.verification.objective import FullObjective
+from tadcore.verification.bound.bounds import bound_theta
+from tadcore.verification.checks.gains import multistart
+from tadcore.verification.oracle.matrices import matrices_of
+from tadcore.verification.oracle.objective import FullObjective
 
 INSTANTS = 20
 """Networks drawn for each game: a game costs a Riccati solution."""

@@ -16,7 +16,7 @@ import atheris
 
 with atheris.instrument_imports(include=["tadcore", "tomllib"]):
     import tadcore
-    from tadcore._manifest import SEAL, Manifest, seal
+    from tadcore.study.manifest import SEAL, Manifest, seal
 
 FOLDER = Path(tempfile.mkdtemp(prefix="tadcore-fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
 

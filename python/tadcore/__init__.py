@@ -18,20 +18,27 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import scenarios
     from ._core import __version__
-    from .batch import Batch, simulate_batch
-    from .equilibrium import Equilibrium, solve_equilibrium
-    from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, VerificationError, WorkerError
-    from .maps import OutcomeMap, outcome_map
-    from .network import NetworkChange, VisibilityNetwork
-    from .outcome import Outcome, OutcomeKind
-    from .radius import RadiusCurve, radius_curve
-    from .result import StudyResult, load_study
-    from .scenario import Attacker, Defender, Scenario, Target
-    from .simulation import Run, simulate
+    from .analysis.maps import OutcomeMap, outcome_map
+    from .analysis.radius import RadiusCurve, radius_curve
+    from .analysis.sweeps import SweepResult, sweep
+    from .errors import (
+        NoEquilibriumError,
+        ScenarioError,
+        StoreError,
+        TadcoreError,
+        VerificationError,
+        WorkerError,
+    )
+    from .game.equilibrium import Equilibrium, solve_equilibrium
+    from .game.network import NetworkChange, VisibilityNetwork
+    from .game.outcome import Outcome, OutcomeKind
+    from .game.synthesis import Gains, synthesize
+    from .scenario.model import Attacker, Defender, Scenario, Target
+    from .simulation.batch import Batch, simulate_batch
+    from .simulation.run import Run, simulate
     from .statistics import HalfWidth
-    from .study import Study
-    from .sweeps import SweepResult, sweep
-    from .synthesis import Gains, synthesize
+    from .study.result import StudyResult, load_study
+    from .study.study import Study
     from .verification import VerificationReport, verify
 
 __all__ = [
@@ -75,52 +82,60 @@ __all__ = [
 
 _HOMES = {
     "Attacker": "scenario",
-    "Batch": "batch",
+    "Batch": "simulation.batch",
     "Defender": "scenario",
-    "Equilibrium": "equilibrium",
-    "Gains": "synthesis",
+    "Equilibrium": "game.equilibrium",
+    "Gains": "game.synthesis",
     "HalfWidth": "statistics",
-    "NetworkChange": "network",
+    "NetworkChange": "game.network",
     "NoEquilibriumError": "errors",
-    "Outcome": "outcome",
-    "OutcomeKind": "outcome",
-    "OutcomeMap": "maps",
-    "RadiusCurve": "radius",
+    "Outcome": "game.outcome",
+    "OutcomeKind": "game.outcome",
+    "OutcomeMap": "analysis.maps",
+    "RadiusCurve": "analysis.radius",
     "Run": "simulation",
     "Scenario": "scenario",
     "ScenarioError": "errors",
     "StoreError": "errors",
     "Study": "study",
-    "StudyResult": "result",
-    "SweepResult": "sweeps",
+    "StudyResult": "study.result",
+    "SweepResult": "analysis.sweeps",
     "TadcoreError": "errors",
     "Target": "scenario",
     "VerificationError": "errors",
     "VerificationReport": "verification",
-    "VisibilityNetwork": "network",
+    "VisibilityNetwork": "game.network",
     "WorkerError": "errors",
     "__version__": "_core",
-    "load_study": "result",
-    "outcome_map": "maps",
-    "radius_curve": "radius",
+    "load_study": "study.result",
+    "outcome_map": "analysis.maps",
+    "radius_curve": "analysis.radius",
     "simulate": "simulation",
-    "simulate_batch": "batch",
-    "solve_equilibrium": "equilibrium",
-    "sweep": "sweeps",
-    "synthesize": "synthesis",
+    "simulate_batch": "simulation.batch",
+    "solve_equilibrium": "game.equilibrium",
+    "sweep": "analysis.sweeps",
+    "synthesize": "game.synthesis",
     "verify": "verification",
 }
-_ROOMS = frozenset(_HOMES.values()) | {
-    "cli",
-    "explorer",
-    "plotting",
-    "report",
-    "reproduce",
-    "sampling",
-    "scenarios",
-    "sensitivity",
-    "store",
-}
+_WINGS = frozenset(
+    {
+        "analysis",
+        "cli",
+        "errors",
+        "explorer",
+        "game",
+        "plotting",
+        "report",
+        "reproduce",
+        "sampling",
+        "scenario",
+        "scenarios",
+        "simulation",
+        "statistics",
+        "study",
+        "verification",
+    }
+)
 
 
 def __getattr__(name: str) -> Any:
@@ -129,10 +144,10 @@ def __getattr__(name: str) -> Any:
         value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
         globals()[name] = value
         return value
-    if name in _ROOMS:
+    if name in _WINGS:
         return import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*__all__, *_ROOMS, *globals()})
+    return sorted({*__all__, *_WINGS, *globals()})

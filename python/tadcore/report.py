@@ -13,11 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from . import statistics
-from ._dataset import provenance
-from ._files import write_whole
+from ._shared.files import write_whole
 from .errors import ScenarioError
+from .simulation.files import provenance
 from .statistics import TrialOutcomes
-from .statistics._outcomes import Floats, indicators
+from .statistics.outcomes import Floats, indicators
 
 __all__ = ["report"]
 

@@ -11,8 +11,8 @@ from PIL import Image
 
 import tadcore
 from tadcore import plotting
-from tadcore.plotting._network import _NEW
-from tadcore.plotting._scene import Scene
+from tadcore.plotting.motion.scene import Scene
+from tadcore.plotting.run.network import _NEW
 
 FRAMES_IN_A_BEAT = 4  # 0.4 s at 10 pictures a second
 

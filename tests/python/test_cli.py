@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from tadcore import NoEquilibriumError, scenarios
-from tadcore.cli import main
+from tadcore.cli.app import main
 
 
 @pytest.fixture

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 import tadcore
-from tadcore import plotting, sampling, sensitivity, statistics, verification
+from tadcore import plotting, statistics, verification
+from tadcore.analysis import sensitivity
+from tadcore.sampling import shapes as sampling
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(

@@ -7,15 +7,15 @@ import pytest
 
 pytest.importorskip("tadcore._core")
 
-ROOMS = ["", ".scenario", ".scenarios", ".equilibrium", ".network", ".synthesis", ".simulation", ".batch"]
-ROOMS += [".sampling", ".study", ".sweeps"]
-ROOMS += [".maps", ".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
-ROOMS += [".verification", ".verification.events"]
+MODULES = ["", ".scenario.model", ".scenarios", ".game.equilibrium", ".game.network", ".game.synthesis"]
+MODULES += [".simulation.run", ".simulation.batch", ".sampling.shapes", ".study.study", ".analysis.sweeps", ".analysis.maps"]
+MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
+MODULES += [".verification", ".verification.continuous.events"]
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_the_examples_of(room):
-    module = importlib.import_module(f"tadcore{room}")
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_of(name):
+    module = importlib.import_module(f"tadcore{name}")
     failed, tried = doctest.testmod(module, extraglobs={"VisibilityNetwork": _network()})
     assert tried > 0
     assert failed == 0

@@ -120,7 +120,7 @@ def test_a_game_without_equilibrium_says_for_how_long_it_has_one(r, q_d, q_targe
 
 
 def test_runs_with_the_same_weights_share_one_game():
-    from tadcore import _game
+    from tadcore.game import compiled as _game
 
     sc = tadcore.scenarios.load("paper-i1")
     assert _game.game_of(sc) is _game.game_of(tadcore.scenarios.load("paper-i1-full"))

@@ -21,9 +21,9 @@ bokeh = pytest.importorskip("bokeh")
 from bokeh.document import Document  # noqa: E402
 from bokeh.models import PointDrawTool  # noqa: E402
 
-from tadcore.cli import main  # noqa: E402
+from tadcore.cli.app import main  # noqa: E402
 from tadcore.explorer import Explorer, Page  # noqa: E402
-from tadcore.explorer._pointer import Pointer  # noqa: E402
+from tadcore.explorer.pointer import Pointer  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -334,7 +334,7 @@ def test_the_page_is_served_to_this_machine(address):
 
 
 def test_the_command_says_what_it_needs(monkeypatch, capsys):
-    monkeypatch.setattr("tadcore._cli_explore.find_spec", lambda name: None)
+    monkeypatch.setattr("tadcore.cli.explore.find_spec", lambda name: None)
     with pytest.raises(SystemExit) as left:
         main(["explore"])
     assert left.value.code == 2

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import tadcore
 from tadcore import plotting
-from tadcore.plotting._style import look
+from tadcore.plotting.tools.style import look
 
 pytestmark = pytest.mark.usefixtures("agg")
 

@@ -14,8 +14,8 @@ import pytest
 import tadcore
 from study_cases import CHUNK, calm, resealed, study
 from tadcore import ScenarioError, StoreError
-from tadcore._game import game_of
-from tadcore._manifest import Manifest
+from tadcore.game.compiled import game_of
+from tadcore.study.manifest import Manifest
 
 SOURCES = Path(tadcore.__file__).parent
 

@@ -6,8 +6,9 @@ import pytest
 import xarray as xr
 
 import tadcore
-from tadcore import ScenarioError, maps, outcome_map
-from tadcore.cli import main
+from tadcore import ScenarioError, outcome_map
+from tadcore.analysis import maps
+from tadcore.cli.app import main
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -12,9 +12,9 @@ from mpl_toolkits.mplot3d import Axes3D
 
 import tadcore
 from tadcore import plotting
-from tadcore.plotting import paper
-from tadcore.plotting._ends import spread
-from tadcore.plotting._style import edge_text, look
+from tadcore.plotting.tools.ends import spread
+from tadcore.plotting.tools.style import edge_text, look
+from tadcore.reproduce import figures as paper
 
 pytestmark = pytest.mark.usefixtures("agg")
 

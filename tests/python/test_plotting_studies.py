@@ -13,9 +13,9 @@ from scipy import stats
 
 import tadcore
 from tadcore import plotting, statistics
-from tadcore.plotting._outcomes import input_label, outcome_look
-from tadcore.plotting.shares import range_edges
-from tadcore.sensitivity import sobol
+from tadcore.analysis.sensitivities import sobol
+from tadcore.plotting.study.shares import range_edges
+from tadcore.plotting.tools.outcomes import input_label, outcome_look
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import tadcore
 from tadcore import Scenario, TadcoreError
-from tadcore._manifest import Manifest
+from tadcore.study.manifest import Manifest
 
 PLAIN, NEAR, SMALL = st.floats(0.3, 3.0), st.floats(-3.0, 3.0), st.floats(0.05, 0.4)
 ANY_WEIGHT = st.floats(1e-30, 1e30)

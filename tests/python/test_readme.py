@@ -6,7 +6,7 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
-from tadcore.cli import app
+from tadcore.cli.app import app
 
 README = Path(__file__).parents[2] / "README.md"
 

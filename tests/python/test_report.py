@@ -12,9 +12,9 @@ import pytest
 
 import tadcore
 from tadcore import ScenarioError
-from tadcore.cli import main
+from tadcore.cli.app import main
 from tadcore.report import report
-from tadcore.sampling import Disk
+from tadcore.sampling.shapes import Disk
 
 
 @pytest.fixture(scope="module", autouse=True)

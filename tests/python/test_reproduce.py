@@ -6,10 +6,10 @@ import json
 import pytest
 from rich.console import Console
 
-from tadcore import reproduce as module
 from tadcore import scenarios
-from tadcore.plotting import paper
-from tadcore.published import PUBLISHED
+from tadcore.reproduce import figures as paper
+from tadcore.reproduce import paper as module
+from tadcore.reproduce.published import PUBLISHED
 
 # what an independent implementation computes for interaction I2
 COMPUTED_I2 = {

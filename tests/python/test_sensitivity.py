@@ -8,7 +8,7 @@ from scipy import stats
 
 import tadcore
 from tadcore import ScenarioError
-from tadcore.sensitivity import sensitivity, sobol
+from tadcore.analysis.sensitivities import sensitivity, sobol
 
 CUBE = {name: stats.uniform(-math.pi, 2 * math.pi) for name in ("x1", "x2", "x3")}
 
@@ -96,7 +96,7 @@ def test_games_at_the_points_are_the_games(monkeypatch):
         seen["x"], seen["y"] = x, function(x)
         return sobol(function, names, outputs, **options)
 
-    monkeypatch.setattr("tadcore.sensitivity.sobol", watch)
+    monkeypatch.setattr("tadcore.analysis.sensitivities.sobol", watch)
     found = sensitivity(sc, inputs, points=8, resamples=5)
     assert found.first.shape == (3, 2)
     for i, (x, radius) in enumerate(seen["x"].T):

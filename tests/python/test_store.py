@@ -21,8 +21,8 @@ from scipy import stats
 import tadcore
 from study_cases import CHUNK, edited, parts, resealed, ring, study
 from tadcore import StoreError
-from tadcore._manifest import Manifest
-from tadcore.sampling import Box, Choice
+from tadcore.sampling.shapes import Box, Choice
+from tadcore.study.manifest import Manifest
 
 HERE = Path(__file__).parent
 
@@ -84,7 +84,7 @@ def test_readers_of_parquet_need_nothing_of_ours(clean):
 KILLED = """
 import sys, time
 from study_cases import CHUNK, study
-from tadcore.store import Store
+from tadcore.study.store import Store
 write = Store.write
 Store.write = lambda *given: (time.sleep(0.05), write(*given))  # slow enough to be met on the way
 study(20 * CHUNK).run(store=sys.argv[1], threads=1)
@@ -135,7 +135,7 @@ def test_workers_that_outlive_a_killed_run_do_not_hold_its_store(tmp_path):
 
 
 def test_finished_chunks_are_not_played_again(copied, clean, monkeypatch):
-    monkeypatch.setattr("tadcore._chunks.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
     assert study().run(store=copied).table.equals(clean[0].table)
     shorter = study(CHUNK + 7).run(store=copied)
     assert shorter.table.equals(clean[0].table.slice(0, CHUNK + 7))

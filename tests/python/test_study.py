@@ -18,7 +18,7 @@ from scipy.stats import qmc
 import tadcore
 from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, parts, ring, study
 from tadcore import ScenarioError, Study
-from tadcore.sampling import Box, Cycle, Disk, Gaussian
+from tadcore.sampling.shapes import Box, Cycle, Disk, Gaussian
 
 
 def philox(seed, chunk, purpose, coordinates):
@@ -280,14 +280,14 @@ NINTH = round(float(ring(np.random.Generator(np.random.Philox(key=np.array([7, 1
     ],
 )
 def test_a_bad_draw_is_refused_before_anything_runs(vary, words, monkeypatch, tmp_path):
-    monkeypatch.setattr("tadcore._chunks.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
     with pytest.raises(ScenarioError, match=words):
         study(2 * CHUNK, vary=vary).run(store=tmp_path / "store")
     assert not (tmp_path / "store").exists()
 
 
 def test_a_bad_draw_beyond_the_first_million_ends_the_study_and_keeps_what_came_before(monkeypatch, tmp_path):
-    monkeypatch.setattr("tadcore._chunks._CHECKED_AHEAD", 1)
+    monkeypatch.setattr("tadcore.study.plan._CHECKED_AHEAD", 1)
     with pytest.raises(ScenarioError, match=r"attacker\.position\.y, trial 9,000: got nan"):
         study(2 * CHUNK, vary={"attacker.position": nan_at_9000}).run(store=tmp_path)
     assert list(parts(tmp_path)) == ["part-000000.parquet"]

@@ -15,8 +15,8 @@ from scipy import stats
 import tadcore
 from study_cases import CHUNK, calm, parts
 from tadcore import ScenarioError, Study
-from tadcore.cli import main
-from tadcore.sampling import Annulus, Box, Choice, Cycle, Disk, Gaussian
+from tadcore.cli.app import main
+from tadcore.sampling.shapes import Annulus, Box, Choice, Cycle, Disk, Gaussian
 
 FILE = """
 scenario = "calm.toml"

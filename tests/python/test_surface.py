@@ -60,10 +60,10 @@ def test_an_unknown_keyword_is_refused_everywhere():
         tadcore.Scenario(**sc.model_dump(), colour="red")
 
 
-STUDIED = ["result", "sweeps", "maps", "plotting", "radius", "report", "sensitivity", "statistics"]
+STUDIED = ["study", "plotting", "report", "statistics"]
 
 
-@pytest.mark.parametrize("name", ["equilibrium", "synthesis", "simulation", "batch", *STUDIED])
+@pytest.mark.parametrize("name", ["game", "game.synthesis", "simulation", "analysis", *STUDIED])
 def test_every_parameter_is_documented(name):
     pytest.importorskip("tadcore._core")
     module = importlib.import_module(f"tadcore.{name}")

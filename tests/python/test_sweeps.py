@@ -6,7 +6,7 @@ import pytest
 import tadcore
 from study_cases import CHUNK, ESCAPE, escaping, parts, study
 from tadcore import ScenarioError, Study, sweep
-from tadcore.sampling import Box
+from tadcore.sampling.shapes import Box
 
 
 def test_every_cell_is_the_study_of_its_scenario():
@@ -74,7 +74,7 @@ def test_a_store_holds_every_cell_and_grows_with_the_grid(tmp_path, monkeypatch)
     played = []
     real = tadcore.simulate_batch
     monkeypatch.setattr(
-        "tadcore._chunks.simulate_batch", lambda sc, *a, **k: played.append(sc.horizon) or real(sc, *a, **k)
+        "tadcore.study.plan.simulate_batch", lambda sc, *a, **k: played.append(sc.horizon) or real(sc, *a, **k)
     )
     second = sweep(base, {"horizon": [1.0, 0.25, 0.5]}, store=tmp_path)
     assert set(played) == {0.25}

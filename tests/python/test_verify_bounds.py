@@ -14,11 +14,11 @@ from oracle.riccati import equilibrium
 from oracle.scenario import as_mapping
 from oracle.synthesis import Problem, solve
 from samples import random_game, random_network, random_start
-from tadcore import cli
 from tadcore import verification as v
-from tadcore.verification._matrices import matrices_of
-from tadcore.verification.bounds import bound_theta
-from tadcore.verification.objective import FullObjective
+from tadcore.cli import app as cli
+from tadcore.verification.bound.bounds import bound_theta
+from tadcore.verification.oracle.matrices import matrices_of
+from tadcore.verification.oracle.objective import FullObjective
 
 pytest.importorskip("clarabel")
 SEEDS = st.integers(0, 2**32 - 1)
@@ -197,7 +197,7 @@ def test_the_report_and_the_command_line_print_the_gap(capsys):
 
 def test_without_the_solver_the_error_names_the_extra(monkeypatch):
     sc = tadcore.scenarios.load("paper-i1")
-    monkeypatch.setattr("tadcore.verification.bounds.find_spec", lambda name: None)
+    monkeypatch.setattr("tadcore.verification.bound.bounds.find_spec", lambda name: None)
     for ask in (
         lambda: v.verify(sc, bound=True),
         lambda: v.theta_bound(sc, step=0, adjacency=np.ones((3, 4))),

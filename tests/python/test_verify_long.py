@@ -12,7 +12,7 @@ import tadcore
 from oracle.model import Start, uniform
 from oracle.scenario import as_mapping
 from tadcore import verification as v
-from tadcore.verification._matrices import matrices_of, stacked_rows
+from tadcore.verification.oracle.matrices import matrices_of, stacked_rows
 
 LONG = {
     "one defender": (

@@ -13,10 +13,10 @@ from oracle.riccati import derivative, integrate
 from oracle.scenario import as_mapping
 from samples import full_P, random_game, random_network, random_start
 from tadcore import verification as v
-from tadcore.verification._flow import gauss, propagate, riccati_within
-from tadcore.verification._matrices import matrices_of
-from tadcore.verification.adapted import Adapted
-from tadcore.verification.objective import FullObjective
+from tadcore.verification.oracle.adapted import Adapted
+from tadcore.verification.oracle.flow import gauss, propagate, riccati_within
+from tadcore.verification.oracle.matrices import matrices_of
+from tadcore.verification.oracle.objective import FullObjective
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import tadcore
 from tadcore import verification as v
 from tadcore.plotting import externality as draw
-from tadcore.verification import geometry, steps
+from tadcore.verification.checks import geometry, steps
 
 mpl.use("agg")
 

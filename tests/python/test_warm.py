@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import tadcore
-from tadcore import _game
-from tadcore.sampling import Box
+from tadcore.game import compiled as _game
+from tadcore.sampling.shapes import Box
 
 PLACES = {"attacker.position": Box([-3.0, -3.0], [3.0, 3.0])}
 

@@ -4,8 +4,8 @@ Started by ``tadcore explore``. It needs Bokeh (the extra ``explore``). A game i
 is shown in projection along one of its axes.
 """
 
-from ._model import Explorer
-from ._page import Page
-from ._server import serve
+from .model import Explorer
+from .page import Page
+from .server import serve
 
 __all__ = ["Explorer", "Page", "serve"]

@@ -4,20 +4,26 @@ Every function draws in the axes it is given, or in new ones, and returns them; 
 read at one column (3.5 in) and across two (7.16 in), to a colour-blind reader and in grey.
 """
 
-from ._animation import Animation
-from ._compare import compare
-from ._externality import externality
-from ._gains import gains
-from ._labels import Labels
-from ._network import network
-from ._raster import MAX_ROWS, visibility
-from ._save import save
-from ._series import MAX_VERTICALS, controls, distances, theta
-from ._style import COLUMN, PAGE, style
-from ._trajectories import MAX_EDGE_LABELS, trajectories
-from .maps import outcome_map
-from .shares import outcomes_by_input, outcomes_by_inputs
-from .studies import comparison, incidence, outcome_probabilities, radius_curve, sensitivity
+from tadcore.plotting.motion.animation import Animation
+from tadcore.plotting.run.compare import compare
+from tadcore.plotting.run.externality import externality
+from tadcore.plotting.run.gains import gains
+from tadcore.plotting.run.network import network
+from tadcore.plotting.run.raster import MAX_ROWS, visibility
+from tadcore.plotting.run.series import MAX_VERTICALS, controls, distances, theta
+from tadcore.plotting.run.trajectories import MAX_EDGE_LABELS, trajectories
+from tadcore.plotting.study.charts import (
+    comparison,
+    incidence,
+    outcome_probabilities,
+    radius_curve,
+    sensitivity,
+)
+from tadcore.plotting.study.maps import outcome_map
+from tadcore.plotting.study.shares import outcomes_by_input, outcomes_by_inputs
+from tadcore.plotting.tools.labels import Labels
+from tadcore.plotting.tools.save import save
+from tadcore.plotting.tools.style import COLUMN, PAGE, style
 
 __all__ = [
     "COLUMN",

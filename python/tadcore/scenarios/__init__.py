@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from tadcore.errors import ScenarioError
 
 if TYPE_CHECKING:
-    from tadcore.scenario import Scenario
+    from tadcore.scenario.model import Scenario
 
 __all__ = ["load", "names", "summary", "text"]
 
@@ -39,7 +39,7 @@ def names() -> tuple[str, ...]:
 
 def load(name: str) -> Scenario:
     """A bundled scenario; raises `ScenarioError` for a name that is not one, and suggests the nearest."""
-    from tadcore.scenario import Scenario
+    from tadcore.scenario.model import Scenario
 
     return Scenario.from_toml_string(text(name), name=f"{name}.toml")
 

@@ -4,10 +4,10 @@ Every function takes plain arrays of outcomes, or the result of a study, and ret
 table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
 """
 
-from ._outcomes import TrialOutcomes, outcome_counts, outcome_names
 from .comparison import Comparison, compare, difference_interval, paired
 from .incidence import Incidence, incidence
 from .intervals import OutcomeProbabilities, probabilities, proportion_interval
+from .outcomes import TrialOutcomes, outcome_counts, outcome_names
 from .sequences import HalfWidth, mixture_interval
 
 __all__ = [

@@ -23,12 +23,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._arrays import refuse_where
+from tadcore._shared.arrays import refuse_where
+from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
-from tadcore.outcome import OutcomeKind
+from tadcore.game.outcome import OutcomeKind
 
-from ._outcomes import KINDS, Floats, Integers, TrialOutcomes, as_level, as_outcomes, indicators, outcome_names
-from ._tables import as_text
+from .outcomes import (
+    KINDS,
+    Floats,
+    Integers,
+    TrialOutcomes,
+    as_level,
+    as_outcomes,
+    indicators,
+    outcome_names,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

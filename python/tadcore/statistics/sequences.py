@@ -30,10 +30,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore._arrays import as_index
+from tadcore._shared.arrays import as_index
 from tadcore.errors import ScenarioError
 
-from ._outcomes import KINDS, as_level, outcome_names
+from .outcomes import KINDS, as_level, outcome_names
 
 
 @dataclass(frozen=True)

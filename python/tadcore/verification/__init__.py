@@ -26,31 +26,49 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tadcore._chatter import Chatter, chatter
-from tadcore.equilibrium import solve_equilibrium
 from tadcore.errors import ScenarioError, VerificationError
-from tadcore.simulation import Run, simulate
+from tadcore.game.chattering import Chatter, chatter
+from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.externality import control_jumps
+from tadcore.simulation.run import Run, simulate
+from tadcore.verification.bound.bounds import ThetaBound, require_clarabel, theta_bound
+from tadcore.verification.checks.adapted_nash import check_nafne, gap_order, sampling_gap
+from tadcore.verification.checks.consistency import check_consistency, index_distance
+from tadcore.verification.checks.decentral import Decentralised, check_decentral, decentralise
+from tadcore.verification.checks.gains import (
+    CertificateRates,
+    certificate_rates,
+    check_gains,
+    lowest_curvature,
+    multistart,
+)
+from tadcore.verification.checks.geometry import (
+    check_geometry,
+    moved,
+    off_the_line,
+    radius_delay,
+    relabelled,
+)
+from tadcore.verification.checks.nash import check_equilibrium, riccati_defect
+from tadcore.verification.checks.record import check_record
+from tadcore.verification.checks.steps import (
+    Refinement,
+    StepStudy,
+    check_steps,
+    refine_batch,
+    step_study,
+)
+from tadcore.verification.continuous.events import play_by_events
+from tadcore.verification.continuous.plays import Event, EventPlay, Slide
+from tadcore.verification.continuous.sliding import SlidingStudy, sliding_study
+from tadcore.verification.oracle.adapted import Adapted, Deviation, Index
+from tadcore.verification.oracle.indices import AdaptedWeights, adapted_weights
+from tadcore.verification.oracle.responses import BestResponse, best_responses
 
-from .adapted import Adapted, Deviation, Index
-from .bounds import ThetaBound, require_clarabel, theta_bound
-from .consistency import check_consistency, index_distance
-from .decentral import Decentralised, check_decentral, decentralise
-from .events import play_by_events
-from .externality import control_jumps
-from .fne import check_equilibrium, riccati_defect
-from .gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
-from .geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
-from .indices import AdaptedWeights, adapted_weights
-from .nafne import check_nafne, gap_order, sampling_gap
-from .plays import Event, EventPlay, Slide
-from .record import check_record
 from .report import Check, Measurement, VerificationReport, combine
-from .responses import BestResponse, best_responses
-from .sliding import SlidingStudy, sliding_study
-from .steps import Refinement, StepStudy, check_steps, refine_batch, step_study
 
 if TYPE_CHECKING:
-    from tadcore.scenario import Scenario
+    from tadcore.scenario.model import Scenario
 
 __all__ = [
     "Adapted",
@@ -153,7 +171,7 @@ def verify(
     >>> report["nafne.value.defenders"].accepted
     True
     """
-    from tadcore.scenario import Scenario
+    from tadcore.scenario.model import Scenario
 
     if not isinstance(sc_or_run, Scenario | Run):
         raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")

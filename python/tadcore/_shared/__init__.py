@@ -1,0 +1,1 @@
+"""What every wing uses: arrays from outside, files, limits and text."""

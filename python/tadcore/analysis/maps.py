@@ -1,0 +1,215 @@
+"""Outcome maps: how the game ends, for every place where one player could have started.
+
+All starts of a map share the game, its radii and the other players' places, so a map is one large batch. It is played
+in blocks of rows, and beyond the map itself needs memory for one block only.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore._shared.arrays import as_index
+from tadcore.cli.terminal import bar
+from tadcore.errors import ScenarioError
+from tadcore.game.outcome import OutcomeKind
+from tadcore.simulation.batch import simulate_batch
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["OutcomeMap", "outcome_map"]
+
+_BLOCK = 1 << 16
+"""Starts played at once: some megabytes of positions, and enough work for any number of threads."""
+
+_FIGURES = {".png", ".pdf", ".svg"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutcomeMap:
+    """How the game ends over a grid of one player's start; made by `outcome_map`.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        The game, with everyone else's place.
+    player : str
+        Whose start varies.
+    dataset : xarray.Dataset
+        ``kind`` (int8), ``defender`` (int32) and ``time`` (float64) over (y, x), coded as in `tadcore.Batch`.
+    """
+
+    scenario: Scenario
+    player: str
+    dataset: xarray.Dataset
+
+    def counts(self) -> dict[str, int]:
+        """How many places of the grid lead to each kind of outcome."""
+        kind = self.dataset["kind"].values
+        return {code.name.lower(): int(np.count_nonzero(kind == code)) for code in OutcomeKind}
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Draw the map; see `tadcore.plotting.outcome_map`."""
+        from tadcore.plotting import outcome_map as draw
+
+        return draw(self, ax, **options)
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the data (``.nc``, netCDF 3) or the figure (``.png``, ``.pdf``, ``.svg``), whole or not at all.
+
+        Options go to `plot`, where a figure is written.
+
+        Raises
+        ------
+        ScenarioError
+            The file name ends in something else.
+        """
+        target = Path(path)
+        check_destination("path", target)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.suffix == ".nc":
+            from tadcore._shared.files import write_whole
+
+            write_whole(target, bytes(self.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+            return target
+        import matplotlib.pyplot as plt
+
+        from tadcore import plotting
+
+        with plotting.style():
+            figure = self.plot(**options).get_figure(root=True)
+            assert figure is not None
+            plotting.save(figure, target.with_suffix(""), formats=[target.suffix[1:]])
+            plt.close(figure)
+        return target
+
+    def __repr__(self) -> str:
+        rows, columns = self.dataset["kind"].shape
+        counts = ", ".join(f"{count:,} {name}" for name, count in self.counts().items())
+        return f"OutcomeMap(start of {self.player} on {columns} × {rows} places: {counts})"
+
+
+def outcome_map(
+    sc: Scenario,
+    player: str = "attacker",
+    *,
+    x: tuple[float, float, int] = (-5.0, 5.0, 201),
+    y: tuple[float, float, int] = (-5.0, 5.0, 201),
+    z: float | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> OutcomeMap:
+    """Play the game from every place of a grid of one player's start.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game, and where the others start.
+    player : str
+        ``"d1"`` … ``"dn"``, ``"target"`` or ``"attacker"``.
+    x, y : (low, high, count)
+        The grid: ``count`` places from ``low`` to ``high``, both included.
+    z : float, optional
+        In space, the height of the plane of the grid; the player's own by default.
+    threads : int, optional
+        Worker threads; all cores by default.
+    progress : bool
+        Whether to show a progress bar, where standard error is a terminal.
+
+    Returns
+    -------
+    OutcomeMap
+        The outcome and its time at every place.
+
+    Raises
+    ------
+    ScenarioError
+        No such player, or no such grid.
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> found = tadcore.outcome_map(tadcore.scenarios.load("paper-i1"), x=(-2, 2, 3), y=(2, 2, 1))
+    >>> found.dataset["time"].values[0, 0]
+    np.float64(1.395)
+    """
+    import xarray as xr
+
+    from tadcore.simulation.files import provenance
+
+    if player not in sc.players:
+        raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")
+    if z is not None and (sc.dim == 2 or not math.isfinite(z)):
+        raise ScenarioError("z", z, "a finite height" if sc.dim == 3 else "left out: this game is in the plane")
+    columns, rows = _axis("x", x), _axis("y", y)
+    who = sc.players.index(player)
+    shape = (len(rows), len(columns))
+    kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
+    time = np.empty(shape)
+    flat: list[NDArray[Any]] = [kind.reshape(-1), defender.reshape(-1), time.reshape(-1)]
+    starts = range(0, kind.size, _BLOCK)
+    for start in bar(starts, f"map of {player}", show=progress):
+        block = slice(start, min(start + _BLOCK, kind.size))
+        places = np.arange(block.start, block.stop)
+        positions = np.repeat(sc.positions[np.newaxis], len(places), axis=0)
+        positions[:, who, 0] = columns[places % len(columns)]
+        positions[:, who, 1] = rows[places // len(columns)]
+        if z is not None:
+            positions[:, who, 2] = z
+        batch = simulate_batch(sc, positions, threads=threads)
+        for whole, part in zip(flat, (batch.kind, batch.defender, batch.time), strict=True):
+            whole[block] = part
+    codes = ", ".join(f"{code.value} {code.name.lower()}" for code in OutcomeKind)
+    return OutcomeMap(
+        scenario=sc,
+        player=player,
+        dataset=xr.Dataset(
+            {
+                "kind": (("y", "x"), kind, {"long_name": f"outcome: {codes}"}),
+                "defender": (("y", "x"), defender, {"long_name": "intercepting defender, 0-based; -1 where none"}),
+                "time": (("y", "x"), time, {"long_name": "instant of the end", "units": "1"}),
+            },
+            coords={
+                "x": ("x", columns, {"long_name": f"initial x of {player}", "units": "1"}),
+                "y": ("y", rows, {"long_name": f"initial y of {player}", "units": "1"}),
+            },
+            attrs={
+                "title": f"Outcome by the start of {player}",
+                "player": player,
+                **({} if sc.dim == 2 else {"z": float(sc.positions[who, 2] if z is None else z)}),
+                **provenance(sc),
+            },
+        ),
+    )
+
+
+def check_destination(field: str, path: Path) -> None:
+    """Refuse a file name that tells nothing of what to write."""
+    if path.suffix not in _FIGURES | {".nc"}:
+        kinds = ", ".join(sorted(_FIGURES))
+        raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
+
+
+def _axis(field: str, given: Sequence[Any]) -> NDArray[np.float64]:
+    try:
+        low, high, count = given
+        ends = float(low), float(high)
+    except (TypeError, ValueError):
+        raise ScenarioError(field, given, "(low, high, count)") from None
+    number = as_index(f"{field}[2]", count, 100_000, least=1)
+    if not all(map(math.isfinite, ends)) or ends[0] > ends[1] or (ends[0] == ends[1]) != (number == 1):
+        raise ScenarioError(field, given, "(low, high, count) with low < high, or one place with low = high")
+    return np.linspace(*ends, number)

@@ -1,0 +1,82 @@
+"""The same starts, played at any radius of one player."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tadcore._shared.arrays import as_positions, as_real, refuse_where
+from tadcore.errors import MISSING, ScenarioError
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.batch import Batch, simulate_batch
+from tadcore.simulation.starts import Rows, rows_of
+from tadcore.study.vary import component
+
+if TYPE_CHECKING:
+    from tadcore.statistics import TrialOutcomes
+
+Floats = NDArray[np.float64]
+RadiusKind = Literal["visibility", "capture"]
+
+
+def starts_of(source: Scenario | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
+    """The game and the starts to play: those given, or those of a study."""
+    if not isinstance(source, Scenario):
+        if positions is not None:
+            raise ScenarioError("positions", "an array", "left out: a study brings its own starts")
+        return source.scenario, rows_of(source.scenario, source.inputs, source.trials)
+    if positions is None:
+        raise ScenarioError("positions", MISSING, "the starts to play, of shape (M, n + 2, dim)")
+    starts = as_positions(positions, (source.n + 2, source.dim), rows=True)
+    if not len(starts):
+        raise ScenarioError("positions", "no trials", "at least one start")
+    return source, Rows(starts, source.visibility_radii, source.capture_radii)
+
+
+class Replays:
+    """The same starts at any radius of one player."""
+
+    def __init__(self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None) -> None:
+        if kind not in ("visibility", "capture"):
+            raise ScenarioError("kind", kind, 'one of "visibility" and "capture"')
+        labels = sc.constrained if kind == "visibility" else (*sc.players[: sc.n], "attacker")
+        if player not in labels:
+            raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
+        owner = f"defenders.{int(player[1:]) - 1}" if player.startswith("d") else player
+        self.column = component(sc, f"{owner}.{kind}_radius").row
+        self.sc, self.rows, self.kind, self.threads = sc, rows, kind, threads
+        self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
+
+    def checked(self, field: str, radii: ArrayLike) -> Floats:
+        """Radii that every trial accepts, σ < ζ included."""
+        values = as_real(field, radii, "positive numbers").reshape(np.shape(radii))
+        if self.kind == "capture":
+            refuse_where(field, values, ~((values > 0.0) & np.isfinite(values)), "a positive finite number")
+        else:
+            refuse_where(field, values, ~(values > 0.0), "a positive number, or inf")
+        if self.column < self.sc.n:
+            if self.kind == "visibility":
+                least = float(self.rows.capture_radii[..., self.column].max())
+                refuse_where(field, values, values <= least, f"larger than the player's capture radius ({least!r})")
+            else:
+                most = float(self.rows.visibility_radii[..., self.column].min())
+                refuse_where(field, values, values >= most, f"smaller than the player's visibility radius ({most!r})")
+        return values
+
+    def play(self, radius: float | Floats, trials: NDArray[np.int64] | None = None) -> Batch:
+        """All trials at one radius, or chosen trials each at its own."""
+        chosen = slice(None) if trials is None else trials
+        positions = self.rows.positions[chosen]
+        visibility, capture = (
+            np.array(radii if radii.ndim == 1 else radii[chosen])
+            for radii in (self.rows.visibility_radii, self.rows.capture_radii)
+        )
+        varied = visibility if self.kind == "visibility" else capture
+        if np.ndim(radius) and varied.ndim == 1:
+            varied = np.repeat(varied[np.newaxis], len(positions), axis=0)
+        varied[..., self.column] = radius
+        if self.kind == "visibility":
+            return simulate_batch(self.sc, positions, varied, capture, threads=self.threads)
+        return simulate_batch(self.sc, positions, visibility, varied, threads=self.threads)

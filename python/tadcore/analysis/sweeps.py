@@ -1,0 +1,259 @@
+"""A study repeated over a grid of anything in the scenario: weights, horizon, step, fixed radii and positions.
+
+Every cell of the grid is another scenario, and, where it differs in weights or horizon, another game with its own
+Riccati solution and table. All cells draw with the same seed, so a difference between two cells is not blurred by
+different draws. A cell without an equilibrium is a result like any other: it says when the solution escapes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tadcore.errors import NoEquilibriumError, ScenarioError
+from tadcore.game.outcome import OutcomeKind
+from tadcore.study.vary import expand, game_fields, indexed, normal
+
+if TYPE_CHECKING:
+    import xarray
+
+    from tadcore.scenario.model import Scenario
+    from tadcore.study.result import StudyResult
+    from tadcore.study.study import StoppingRule, Study
+
+__all__ = ["Cell", "SweepResult", "sweep"]
+
+_STATES = ("position", "visibility_radius", "capture_radius")
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """One point of the grid.
+
+    Attributes
+    ----------
+    values : dict of str to object
+        What each swept path is here.
+    study : Study
+        The study of this cell.
+    result : StudyResult or None
+        Its outcomes; None where the game has no equilibrium.
+    escape_time : float
+        Backward time at which the Riccati solution escapes; NaN where there is an equilibrium.
+    """
+
+    values: dict[str, Any]
+    study: Study
+    result: StudyResult | None
+    escape_time: float
+
+    @property
+    def status(self) -> str:
+        """``"done"`` or ``"no equilibrium"``."""
+        return "no equilibrium" if self.result is None else "done"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult:
+    """The cells of a sweep, the last path running fastest; made by `sweep`.
+
+    Attributes
+    ----------
+    study : Study
+        What was repeated.
+    grid : dict of str to tuple
+        The swept paths and their values.
+    cells : tuple of Cell
+        One for each point of the grid.
+    """
+
+    study: Study
+    grid: dict[str, tuple[Any, ...]]
+    cells: tuple[Cell, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the grid."""
+        return tuple(map(len, self.grid.values()))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Outcomes over the grid, as a labelled dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            Its dimensions are the swept paths and ``outcome``. Variables: ``count`` and ``probability`` (the share of
+            the trials) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time of all games) and
+            ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0 and shares and
+            times NaN; ``escape_time`` is NaN everywhere else.
+        """
+        import xarray as xr
+
+        from tadcore.simulation.files import provenance
+
+        kinds = sorted(OutcomeKind)
+        rows = [_summary(cell.result, kinds) for cell in self.cells]
+
+        def over(values: Sequence[Any]) -> Any:
+            array = np.array(values)
+            return array.reshape(self.shape + array.shape[1:])
+
+        dims = tuple(self.grid)
+        by_outcome = (*dims, "outcome")
+        return xr.Dataset(
+            {
+                "count": (by_outcome, over([row[0] for row in rows])),
+                "probability": (by_outcome, over([row[1] for row in rows])),
+                "mean_time": (by_outcome, over([row[2] for row in rows])),
+                "trials": (dims, over([int(row[0].sum()) for row in rows])),
+                "mean_end": (dims, over([row[3] for row in rows])),
+                "escape_time": (dims, over([cell.escape_time for cell in self.cells])),
+            },
+            coords={
+                **{path: _labels(values) for path, values in self.grid.items()},
+                "outcome": [kind.name.lower() for kind in kinds],
+                "status": (dims, over([cell.status for cell in self.cells])),
+            },
+            attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
+        )
+
+    def __repr__(self) -> str:
+        size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())
+        without = sum(cell.result is None for cell in self.cells)
+        return f"SweepResult({size}{f'; {without} without equilibrium' if without else ''})"
+
+
+def sweep(
+    study: Study,
+    grid: Mapping[str, Sequence[Any]],
+    *,
+    progress: bool = False,
+    store: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    until: StoppingRule | None = None,
+) -> SweepResult:
+    """Run a study at every point of a grid.
+
+    Parameters
+    ----------
+    study : Study
+        What is repeated, with its own trials and seed: the draws are the same in every cell.
+    grid : mapping of str to sequence
+        Paths of scenario fields and the values they take, such as ``"attacker.control_weight"``, ``"horizon"`` or
+        ``"defenders.*.control_weight"`` (the same for all); what the study varies cannot be swept.
+    progress : bool
+        Show a bar for each cell, in a terminal or a notebook.
+    store : path, optional
+        A folder with a store for each cell; run again, the sweep goes on, and a larger grid adds to it.
+    threads : int, optional
+        As in `Study.run`.
+    executor : concurrent.futures.Executor, optional
+        As in `Study.run`.
+    until : StoppingRule, optional
+        As in `Study.run`, for each cell.
+
+    Returns
+    -------
+    SweepResult
+        The cells; ``.to_xarray()`` has their outcomes over the grid.
+
+    Raises
+    ------
+    ScenarioError
+        A path leads nowhere, or a value breaks a rule of scenarios; every cell is checked before any runs.
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> from tadcore.sampling import Disk
+    >>> sc = tadcore.scenarios.load("paper-i1")
+    >>> study = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 0.5)}, trials=20, seed=7)
+    >>> swept = tadcore.sweep(study, {"attacker.evasion": [0.0, 1.0]})
+    >>> swept.to_xarray().sizes["attacker.evasion"]
+    2
+    """
+    axes = _axes(study, grid)
+    points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+    studies = [_cell_study(study, point) for point in points]
+    cells = []
+    for number, (point, one) in enumerate(zip(points, studies, strict=True), start=1):
+        folder = None if store is None else Path(store) / _folder(point)
+        label = f"cell {number}/{len(points)}"
+        result, escape = None, float("nan")
+        try:
+            result = one.run(
+                progress=label if progress else False, store=folder, threads=threads, executor=executor, until=until
+            )
+        except NoEquilibriumError as error:
+            escape = error.escape_time
+        cells.append(Cell(point, one, result, escape))
+    return SweepResult(study, axes, tuple(cells))
+
+
+def _axes(study: Study, grid: Mapping[str, Sequence[Any]]) -> dict[str, tuple[Any, ...]]:
+    """The grid with its paths in one form and its values as tuples."""
+    if not isinstance(grid, Mapping) or not grid:
+        raise ScenarioError("grid", grid, 'a mapping such as {"horizon": [4.0, 6.0]}')
+    axes: dict[str, tuple[Any, ...]] = {}
+    taken: dict[str, str] = {}
+    varied = {quantity.owner for quantity in study.quantities}
+    for path, values in grid.items():
+        name = normal(path)
+        if isinstance(values, str | bytes) or not np.ndim(values) or not len(values):
+            raise ScenarioError(f'grid["{path}"]', values, "a sequence of at least one value")
+        for one in _fields(study.scenario, name) or [name]:
+            if one in varied:
+                raise ScenarioError(f'grid["{path}"]', one, "a field that the study does not vary")
+            if one in taken:
+                raise ScenarioError(f'grid["{path}"]', one, f'swept once only: "{taken[one]}" sweeps it too')
+            taken[one] = path
+        axes[name] = tuple(v.tolist() if isinstance(v, np.ndarray | np.generic) else v for v in values)
+    return axes
+
+
+def _fields(sc: Scenario, path: str) -> list[str]:
+    players = ["attacker", "target", *(f"defenders.{i}" for i in range(sc.n))]
+    return expand(path, [*game_fields(sc), *(f"{player}.{field}" for player in players for field in _STATES)])
+
+
+def _cell_study(study: Study, point: Mapping[str, Any]) -> Study:
+    """The study of one point; an error says at which."""
+    changes = {
+        indexed(field): value
+        for path, value in point.items()
+        for field in _fields(study.scenario, path) or [path]  # a path that leads nowhere is refused by replace
+    }
+    return study.replace(sc=study.scenario.replace(changes))
+
+
+def _folder(point: Mapping[str, Any]) -> str:
+    """A name for the store of a cell that does not change when the grid grows."""
+    exact = ",".join(f"{path}={value!r}" for path, value in sorted(point.items()))
+    readable = "".join(c if c.isalnum() or c in "=,.-" else "_" for c in exact)[:80]
+    return f"{readable}-{hashlib.sha256(exact.encode()).hexdigest()[:8]}"
+
+
+def _summary(result: StudyResult | None, kinds: Sequence[OutcomeKind]) -> tuple[Any, Any, Any, float]:
+    """Counts, shares and mean times by outcome, and the mean time of all."""
+    if result is None:
+        nothing = np.full(len(kinds), np.nan)
+        return np.zeros(len(kinds), dtype=np.int64), nothing, nothing, float("nan")
+    counts = np.bincount(result.kind, minlength=len(kinds))
+    total = np.bincount(result.kind, weights=result.time, minlength=len(kinds))
+    means = np.divide(total, counts, out=np.full(len(kinds), np.nan), where=counts > 0)
+    return counts, counts / result.trials, means, float(result.time.mean())
+
+
+def _labels(values: Sequence[Any]) -> list[Any]:
+    """The values as coordinates: numbers as they are, anything else as words."""
+    plain = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+    return list(values) if plain else [str(v) for v in values]

@@ -1,0 +1,78 @@
+# ruff: noqa: D301 (the help texts mark blocks that keep their lines with a backspace character)
+"""The ``map`` and ``report`` commands: pictures of many games."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tadcore.errors import ScenarioError
+
+from .terminal import say
+
+__all__ = ["draw_map", "write_report"]
+
+
+def draw_map(
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A TOML file, or the name of a bundled scenario.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Figure (.png, .pdf, .svg) or data (.nc) to write.")],
+    player: Annotated[
+        str, typer.Option(metavar="NAME", help="Whose start: d1, d2, …, target or attacker.")
+    ] = "attacker",
+    x: Annotated[tuple[float, float], typer.Option(metavar="LOW HIGH", help="Range of x.")] = (-5.0, 5.0),
+    y: Annotated[tuple[float, float], typer.Option(metavar="LOW HIGH", help="Range of y.")] = (-5.0, 5.0),
+    z: Annotated[float | None, typer.Option(metavar="HEIGHT", help="In space: the plane of the map.")] = None,
+    size: Annotated[int, typer.Option(metavar="N", help="Places along x; along y in proportion.")] = 400,
+    time: Annotated[bool, typer.Option("--time", help="Draw when the game ends, not how.")] = False,
+    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+) -> None:
+    """Draw how the game ends for every place where one player could have started.
+
+    \b
+      tadcore map paper-i1 --out map.png
+      tadcore map my.toml --player d2 --x -3 3 --y -3 3 --size 800 --out map.pdf
+      tadcore map my.toml --out map.nc
+
+    The other players start where the scenario has them.
+    """
+    from tadcore.analysis.maps import check_destination, outcome_map
+
+    from .app import load_scenario
+
+    check_destination("--out", out)
+    sc = load_scenario(scenario)
+    rows = max(round((size - 1) * (y[1] - y[0]) / (x[1] - x[0])), 1) + 1 if x[1] > x[0] else size
+    found = outcome_map(sc, player, x=(*x, size), y=(*y, rows), z=z, threads=threads, progress=progress)
+    found.save(out, **({"quantity": "time"} if time else {}))
+    total = found.dataset["kind"].size
+    say(f"{total:,} places for the start of {player}")
+    for name, count in found.counts().items():
+        say(f"{name:<12} {count:>12,}  {count / total:.4f}", indent=2)
+    say(f"written to {out}")
+
+
+def write_report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The store of a study.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("report.html"),
+    title: Annotated[str, typer.Option(metavar="TEXT", help="What to call the study.")] = "",
+    level: Annotated[float, typer.Option(metavar="SHARE", help="Confidence level of intervals and bands.")] = 0.95,
+) -> None:
+    """Write a study as one HTML page: tables, figures and provenance.
+
+    \b
+      tadcore study my-study.toml --store out
+      tadcore report out --out my-study.html
+    """
+    from tadcore.report import report
+    from tadcore.study.result import StudyResult
+
+    if out.is_dir():
+        raise ScenarioError("--out", str(out), "a file to write, not a folder")
+    result = StudyResult.load(folder)
+    report(result, out, title=title, level=level)
+    say(f"{result.trials:,} trials; written to {out}")

@@ -1,0 +1,63 @@
+# ruff: noqa: D301 (the help texts mark blocks that keep their lines with a backspace character)
+"""The ``study`` command: a study from a TOML file, kept in a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .terminal import complain, say
+
+__all__ = ["study"]
+
+_INTERRUPTED = 130
+
+
+def study(
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary, how, and how often.")],
+    store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
+    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Keep the game's table of gains there: read before, written after."),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
+    progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+) -> None:
+    """Play a study, and keep its outcomes in a folder as Parquet.
+
+    \b
+      tadcore study my-study.toml --store out
+      tadcore study my-study.toml --store out --threads 4 --no-progress
+      tadcore study my-study.toml --store out --table paper-i1.table
+
+    Run again, it goes on from what DIR holds. A study file looks like this:
+
+    \b
+      scenario = "paper-i1"
+      trials = 100_000
+      seed = 7
+      design = "sobol"
+      [vary]
+      "attacker.position" = { box = [[-3, -3], [3, 3]] }
+      "defenders.0.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
+
+    Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
+    """
+    from tadcore.study.manifest import Manifest
+    from tadcore.study.study import Study
+
+    wanted = Study.from_toml(file)
+    if resume:
+        Manifest.read(store)
+    try:
+        result = wanted.run(progress=progress, store=store, threads=threads, table=table)
+    except KeyboardInterrupt:
+        complain(f"interrupted; what was finished is in {store}, and the same command goes on from there")
+        raise typer.Exit(_INTERRUPTED) from None
+    say(f"{result.trials:,} trials")
+    for name, count in result.counts().items():
+        say(f"{name:<12} {count:>12,}  {count / result.trials:.4f}", indent=2)
+    say(f"written to {store}")

@@ -1,0 +1,70 @@
+"""Network externality: what one player's new edge does to the controls of the others.
+
+The gains at an instant minimise Θ over the whole team at once (Remark networkexternality), so when an edge of player i
+forms or breaks, the gains of every other player jump too. At each change t_k the jump of a player is
+
+    Δu_p = (G_p(t_k, new network) - G_p(t_k, old network)) z(t_k),
+
+at one and the same instant and state: what the change itself does, apart from the motion.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .synthesis import synthesize
+
+if TYPE_CHECKING:
+    import xarray
+
+    from tadcore.simulation.run import Run
+
+__all__ = ["control_jumps"]
+
+
+def control_jumps(run: Run) -> xarray.Dataset:
+    """The jump in every player's control at every change of the network.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (time, player), the players those with limited sight: ``jump`` (also over axis), its length ``size``, and
+        ``own``, whether an edge of that player itself changed. Jumps where ``own`` is False are the externality.
+        ``edges`` over time names what changed, as in ``"+d2→d1"``. Turn it into a table with ``.to_dataframe()``.
+    """
+    import xarray as xr
+
+    sc, length = run.scenario, len(run.times) - 1
+    before, after = run.adjacency[: length - 1], run.adjacency[1:length]
+    steps = np.flatnonzero((before != after).any(axis=(1, 2))) + 1 if length > 1 else np.zeros(0, dtype=int)
+    labels = list(sc.constrained)
+    jump = np.zeros((len(steps), len(labels), sc.dim))
+    own = np.zeros((len(steps), len(labels)), dtype=bool)
+    for e, k in enumerate(steps.tolist()):
+        z = run.position[k, :-1] - run.position[k, -1]
+        old = synthesize(sc, step=k, adjacency=run.adjacency[k - 1]).rows
+        jump[e] = (run.gains[k] - old) @ z
+        own[e] = (run.adjacency[k] != run.adjacency[k - 1]).any(axis=1)
+    changes = {change.time: change for change in run.network_changes[1:]}
+    edges = []
+    for t in run.times[steps].tolist():
+        change = changes[t]
+        words = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
+        edges.append(" ".join(words))
+    return xr.Dataset(
+        {
+            "jump": (("time", "player", "axis"), jump),
+            "size": (("time", "player"), np.linalg.norm(jump, axis=-1)),
+            "own": (("time", "player"), own),
+            "edges": ("time", np.array(edges, dtype=object)),
+        },
+        coords={"time": run.times[steps], "player": labels, "axis": list("xyz"[: sc.dim])},
+        attrs={"reference": "rem:networkexternality"},
+    )

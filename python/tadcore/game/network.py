@@ -1,0 +1,221 @@
+"""The visibility network in the paper's own form, for a reader to inspect.
+
+Row i of the augmented adjacency 𝒜 (eq:extadj of Singh and Reddy) says whom player i sees: entry j ≠ i the player j,
+entry i the attacker. The rows are the players with limited sight, d1 … dn and in I2 the target; the columns are
+d1 … dn, target. A player p sees q where their distance is at most ζ_p (eq:limob, a closed ball).
+
+===========================  ==============================  ============================================
+here                         paper                           shape
+===========================  ==============================  ============================================
+``adjacency``                𝒜                               (m, N), N = n + 1, m = n in I1 and N in I2
+``Ad``                       Ad (eq:Adij)                    (n, n)
+``Phi_a``                    Φ_a                             (n, n), diagonal
+``Phi_tau``                  Φ_τ of I1                       (n, 1)
+``information_matrix(p)``    𝓘_{d_i}, 𝓘_τ (eq:infomatrix)    (dim·N, dim·N)
+``information_matrix_team``  𝓘_d                             (n·dim·N, dim·N)
+===========================  ==============================  ============================================
+
+This is for looking at one instant; runs use the compiled core.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tadcore._shared.arrays import as_adjacency, as_positions, shape_of
+from tadcore.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["Edge", "Interval", "NetworkChange", "VisibilityNetwork"]
+
+Edge: TypeAlias = tuple[str, str]
+"""Who sees whom, such as ``("d1", "attacker")``."""
+
+
+class NetworkChange(NamedTuple):
+    """An instant at which the network is another than one step before."""
+
+    time: float
+    added: tuple[Edge, ...]
+    removed: tuple[Edge, ...]
+
+
+class Interval(NamedTuple):
+    """A stretch of time with one and the same network."""
+
+    start: float
+    end: float
+    edges: tuple[Edge, ...]
+
+
+class VisibilityNetwork:
+    """Who sees whom at one instant; immutable.
+
+    Parameters
+    ----------
+    adjacency : array_like of bool, shape (m, N)
+        𝒜, with m = N - 1 (I1) or m = N (I2).
+
+    Raises
+    ------
+    ScenarioError
+        The array has another shape or an entry that is neither 0 nor 1.
+
+    Examples
+    --------
+    >>> net = VisibilityNetwork([[1, 1, 0], [0, 0, 1]])
+    >>> net.edges()
+    (('d1', 'd2'), ('d1', 'attacker'), ('d2', 'target'))
+    """
+
+    __slots__ = ("_adjacency",)
+
+    def __init__(self, adjacency: ArrayLike) -> None:
+        shape = shape_of(adjacency)
+        if len(shape) != 2 or shape[1] < 2 or shape[0] not in (shape[1] - 1, shape[1]):
+            raise ScenarioError("adjacency", f"shape {shape}", "of shape (n, n + 1) in I1 or (n + 1, n + 1) in I2")
+        self._adjacency = as_adjacency(adjacency, (shape[0], shape[1]))
+        self._adjacency.flags.writeable = False
+
+    @property
+    def adjacency(self) -> NDArray[np.bool_]:
+        """𝒜, shape (m, N), read-only."""
+        return self._adjacency
+
+    @classmethod
+    def from_positions(cls, sc: Scenario, positions: ArrayLike | None = None) -> VisibilityNetwork:
+        """The network of players at ``positions``, shape (n + 2, dim); the scenario's own start by default."""
+        at = sc.positions if positions is None else as_positions(positions, (sc.n + 2, sc.dim))
+        m, size = len(sc.constrained), sc.n + 1
+        distance = np.linalg.norm(at[:m, None, :] - at[None, :, :], axis=-1)
+        sees = distance <= sc.visibility_radii[:, None]
+        adjacency = sees[:, :size].copy()
+        adjacency[np.arange(m), np.arange(m)] = sees[:, size]
+        return cls(adjacency)
+
+    @property
+    def n(self) -> int:
+        """Number of defenders."""
+        return int(self.adjacency.shape[1]) - 1
+
+    @property
+    def players(self) -> tuple[str, ...]:
+        """Labels d1 … dn, target, attacker."""
+        return (*(f"d{i}" for i in range(1, self.n + 1)), "target", "attacker")
+
+    @property
+    def observers(self) -> tuple[str, ...]:
+        """Labels of the rows of 𝒜."""
+        return self.players[: len(self.adjacency)]
+
+    @property
+    def Ad(self) -> NDArray[np.int_]:
+        """Which defender sees which, shape (n, n), zero on the diagonal."""
+        among = self.adjacency[: self.n, : self.n].astype(np.int_)
+        np.fill_diagonal(among, 0)
+        return among
+
+    @property
+    def Phi_a(self) -> NDArray[np.int_]:
+        """Which defender sees the attacker, shape (n, n), diagonal."""
+        return np.diag(np.diag(self.adjacency[: self.n, : self.n])).astype(np.int_)
+
+    @property
+    def Phi_tau(self) -> NDArray[np.int_]:
+        """Which defender sees the target, shape (n, 1)."""
+        return self.adjacency[: self.n, self.n :].astype(np.int_)
+
+    def information_matrix(self, player: str | int, dim: int = 2) -> NDArray[np.int_]:
+        """𝓘 of one player, shape (dim·N, dim·N): 𝓘 z is what it may use of z.
+
+        diag(row i) · (I_N with -1 down column i off the diagonal) ⊗ I_dim, eq:infomatrix.
+
+        Parameters
+        ----------
+        player : str or int
+            A label such as ``"d2"`` or ``"target"``, or the row's index.
+        dim : int
+            Number of axes.
+        """
+        i = self._row(player)
+        size = self.n + 1
+        relative = np.eye(size, dtype=np.int_)
+        relative[:, i] = -1
+        relative[i, i] = 1
+        return np.kron(self.adjacency[i].astype(np.int_)[:, None] * relative, np.eye(dim, dtype=np.int_))
+
+    @property
+    def information_matrix_team(self) -> NDArray[np.int_]:
+        """𝓘_d = col{𝓘_{d_1}, …, 𝓘_{d_n}} in the plane, shape (2 n N, 2 N)."""
+        return np.vstack([self.information_matrix(i) for i in range(self.n)])
+
+    def edges(self) -> tuple[Edge, ...]:
+        """Every edge as (who sees, who is seen), by observer."""
+        return edges_of(self.adjacency, self.players)
+
+    def _row(self, player: str | int) -> int:
+        if isinstance(player, str) and player in self.observers:
+            return self.observers.index(player)
+        if isinstance(player, int | np.integer) and 0 <= player < len(self.observers):
+            return int(player)
+        rule = f"a player with limited sight: {', '.join(self.observers)}, or an index below {len(self.observers)}"
+        raise ScenarioError("player", player, rule)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, VisibilityNetwork) and np.array_equal(self.adjacency, other.adjacency)
+
+    def __hash__(self) -> int:
+        return hash((self.adjacency.shape, self.adjacency.tobytes()))
+
+    def __repr__(self) -> str:
+        arrows = ", ".join(f"{p}→{q}" for p, q in self.edges())
+        return f"VisibilityNetwork({arrows or 'no edges'})"
+
+
+def edges_of(adjacency: NDArray[np.bool_], players: Sequence[str]) -> tuple[Edge, ...]:
+    """The edges of 𝒜 by observer, the attacker last."""
+    attacker = len(players) - 1
+    seen = ((int(i), attacker if i == j else int(j)) for i, j in zip(*np.nonzero(adjacency), strict=True))
+    return tuple((players[i], players[j]) for i, j in sorted(seen))
+
+
+def changes_of(
+    times: NDArray[np.float64], adjacency: NDArray[np.bool_], players: Sequence[str]
+) -> tuple[NetworkChange, ...]:
+    """The initial network, then every instant at which it differs from the one before.
+
+    ``adjacency`` has one row for each instant at which a network was in force; the terminal instant is not one.
+    """
+    if not len(times):
+        return ()
+    changes = [NetworkChange(float(times[0]), edges_of(adjacency[0], players), ())]
+    for k in np.flatnonzero((adjacency[1:] != adjacency[:-1]).any(axis=(1, 2))) + 1:
+        before, after = adjacency[k - 1], adjacency[k]
+        added, removed = edges_of(after & ~before, players), edges_of(before & ~after, players)
+        changes.append(NetworkChange(float(times[k]), added, removed))
+    return tuple(changes)
+
+
+def intervals_of(changes: Sequence[NetworkChange], end: float) -> tuple[Interval, ...]:
+    """The stretches between changes, the last up to ``end``."""
+    if not changes:
+        return ()
+    stretches: list[Interval] = []
+    edges: set[Edge] = set()
+    for change, until in zip(changes, [*(c.time for c in changes[1:]), end], strict=True):
+        edges = (edges - set(change.removed)) | set(change.added)
+        stretches.append(Interval(change.time, until, tuple(sorted(edges, key=_order))))
+    return tuple(stretches)
+
+
+def _order(edge: Edge) -> tuple[tuple[int, int], tuple[int, int]]:
+    def rank(label: str) -> tuple[int, int]:
+        return (0, int(label[1:])) if label[1:].isdigit() else (1 if label == "target" else 2, 0)
+
+    return rank(edge[0]), rank(edge[1])

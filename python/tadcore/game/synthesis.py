@@ -1,0 +1,160 @@
+"""The gains of the players with limited sight at one instant and one network.
+
+The rows g_i of u_i = g_i z minimise Θ₁ (eq:errfun1 of Singh and Reddy) or Θ₂ (eq:errfun2) over what the network lets
+player i use, g_i = K_i 𝓘_i (eq:nwadapt):
+
+    I1  Θ₁ = γ₁‖ΔQ_d‖² + γ₂‖ΔQ_τ‖² + γ₃‖ΔQ_a‖² + γ₄‖S₁‖²   (eq:perfindex)
+    I2  Θ₂ = γ₁‖ΔQ‖² + γ₂‖S₂‖² + γ₃‖S₃‖²                     (eq:perfmatzsg)
+
+Norms are Frobenius norms of the reduced factors. The paper's matrices are these ⊗ I, so its Θ is dim times the one
+reported here; the minimiser is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tadcore._shared.arrays import as_adjacency, as_index
+from tadcore.errors import ScenarioError
+
+from .compiled import game_of
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+    from .network import VisibilityNetwork
+
+__all__ = ["Gains", "synthesize", "theta_terms"]
+
+_TERMS = {"I1": ("dQ_d", "dQ_tau", "dQ_a", "S1"), "I2": ("dQ", "S2", "S3")}
+
+
+def theta_terms(interaction: Literal["I1", "I2"]) -> tuple[str, ...]:
+    """Names of the terms of Θ, in the order of γ."""
+    return _TERMS[interaction]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Gains:
+    """Gains at one (instant, network); made by `synthesize`.
+
+    Attributes
+    ----------
+    players : tuple of str
+        Labels of the m rows: d1 … dn, and in I2 the target.
+    rows : ndarray, shape (m, N)
+        u_i = rows[i] @ z, z of shape (N, dim). Row i is the reduced factor of K_i 𝓘_i.
+    K : dict of str to ndarray, shape (dim, dim·N)
+        The paper's K_i by player (eq:kpart), zero in the blocks of players that i does not see.
+    theta : float
+        Θ₁ or Θ₂ at the minimiser, in reduced norms (the paper's is dim times this).
+    terms : dict of str to float
+        The squared norms that Θ weighs, unweighted: dQ_d, dQ_tau, dQ_a, S1 or dQ, S2, S3.
+    weights : dict of str to float
+        γ under the same names; ``theta`` is the sum of ``weights[t] * terms[t]``.
+    iterations : int
+        Steps of the solver.
+    converged : bool
+        Whether the relative gradient norm reached the tolerance; `status` says how it ended.
+    status : str
+        How the solver ended.
+    gradient_norm : float
+        Relative norm of the gradient at the end.
+    certified : bool
+        Whether this minimum is proved to be the global one.
+    look : {"canonical", "complex", "stacked", "reversed"}
+        Which look found it: from the canonical start, or one of the further looks for a lower minimum.
+    """
+
+    players: tuple[str, ...]
+    rows: NDArray[np.float64]
+    K: dict[str, NDArray[np.float64]]
+    theta: float
+    terms: dict[str, float]
+    weights: dict[str, float]
+    iterations: int
+    converged: bool
+    status: str
+    gradient_norm: float
+    certified: bool
+    look: Literal["canonical", "complex", "stacked", "reversed"]
+
+    def __repr__(self) -> str:
+        state = f"converged in {self.iterations}" if self.converged else f"NOT converged ({self.status})"
+        return f"Gains({', '.join(self.players)}: Θ={self.theta:.6g}, {state}, gradient {self.gradient_norm:.1e})"
+
+
+def synthesize(
+    sc: Scenario,
+    *,
+    step: int,
+    adjacency: ArrayLike | VisibilityNetwork,
+    method: Literal["newton", "descent"] = "newton",
+    max_iterations: int | None = None,
+) -> Gains:
+    """The gains at instant t_k under a given network.
+
+    They depend on the game, the instant and the network alone, not on positions and not on the way there.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game.
+    step : int
+        k of the instant t_k, 0 … K.
+    adjacency : array_like, shape (m, N), or VisibilityNetwork
+        𝒜: row i whom player i sees, entry j ≠ i the player j, entry i the attacker; 0-1 or bool.
+    method : {"newton", "descent"}
+        ``"newton"``: the exact Hessian from the canonical start, with a second look in complex gains.
+        ``"descent"``: gradient descent with the gradients printed in the paper (eq:errgradient).
+    max_iterations : int, optional
+        Stop after this many steps; the result then says that it has not converged.
+
+    Returns
+    -------
+    Gains
+        The minimiser, every term of Θ and how the solver ended.
+
+    Raises
+    ------
+    ScenarioError
+        The instant is not on the grid, or the adjacency has another shape or other entries than 0 and 1.
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> sc = tadcore.scenarios.load("paper-i1")
+    >>> blind = tadcore.synthesize(sc, step=0, adjacency=[[0, 0, 0, 0]] * 3)
+    >>> bool((blind.rows == 0).all())
+    True
+    """
+    shape = (len(sc.constrained), sc.n + 1)
+    seen = as_adjacency(adjacency, shape)
+    k = as_index("step", step, sc.steps)
+    if method not in ("newton", "descent"):
+        raise ScenarioError("method", method, '"newton" or "descent"')
+    limit = None if max_iterations is None else as_index("max_iterations", max_iterations, 2**31 - 1, least=1)
+    core = game_of(sc).synthesize(k, seen, method=method, max_iterations=limit)
+    names = theta_terms(sc.interaction)
+    axes = np.eye(sc.dim)
+    blocks = {label: np.kron(row, axes) for label, row in zip(sc.constrained, core.K, strict=True)}
+    return Gains(
+        players=sc.constrained,
+        rows=core.rows,
+        K=blocks,
+        theta=core.theta,
+        terms=dict(zip(names, map(float, core.terms), strict=True)),
+        weights=dict(zip(names, sc.synthesis_weights, strict=True)),
+        iterations=core.iterations,
+        converged=core.converged,
+        status=core.status,
+        gradient_norm=core.gradient_norm,
+        certified=core.certified,
+        look=core.look,
+    )

@@ -1,0 +1,1 @@
+"""Figures of one recorded run, or of two overlaid."""

@@ -1,0 +1,174 @@
+"""The visibility network, one small panel per interval."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.patches import FancyArrowPatch
+from numpy.typing import NDArray
+
+from tadcore.plotting.tools.axes import new_panels
+from tadcore.plotting.tools.style import look, note, players
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tadcore.simulation.run import Run
+
+Edge = tuple[str, str]
+
+_NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
+_SMALL = 7.5  # points
+
+_OLD: dict[str, Any] = {
+    "color": "0.62",
+    "linewidth": 0.9,
+    "linestyle": "-",
+    "mutation_scale": 7,
+    "zorder": 2.0,
+}
+_NEW: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 1.9,
+    "linestyle": "-",
+    "mutation_scale": 10,
+    "zorder": 2.4,
+}
+_LOST: dict[str, Any] = {
+    "color": "0.45",
+    "linewidth": 0.9,
+    "linestyle": ":",
+    "mutation_scale": 7,
+    "zorder": 1.8,
+}
+
+
+def network(
+    run: Run, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
+) -> Axes | NDArray[Any]:
+    r"""Draw the directed visibility graph, a panel per interval on which it does not change.
+
+    An arrow from :math:`d_2` to :math:`a` says that :math:`d_2` sees the attacker. Edges that the change at the start
+    of the interval brought are thick and black, those that it took away are dotted, the others grey. Players stand
+    on a circle, the same in all panels: attacker and target on top, defenders in order below. Players who
+    see everything by assumption send no arrows.
+
+    Parameters
+    ----------
+    run : Run
+        The run to draw.
+    axes : Axes or array of Axes, optional
+        Where to draw; a new figure if not given. Axes left over are switched off.
+    max_panels : int
+        At most so many panels; a note says how many were left out.
+    columns : int
+        Panels in a row of a new figure.
+
+    Returns
+    -------
+    Axes or array of Axes
+        ``axes`` as given, or the array of the new ones.
+    """
+    changes = list(run.network_changes)
+    if axes is None:
+        count = max(min(len(changes), max_panels), 1)
+        axes = new_panels(count, columns, page_from=4, row=0.22, rest=0.0, square=True)
+    panels = list(np.asarray(axes, dtype=object).ravel())
+    shown = min(len(changes), max_panels, len(panels))
+    end = float(run.outcome.time)
+    edges: set[Edge] = set()
+    for k in range(shown):
+        time, added, removed = changes[k]
+        new, lost = {_edge(e) for e in added}, {_edge(e) for e in removed}
+        edges = (edges | new) - lost
+        last = k + 1 == len(changes)
+        until = end if last else float(changes[k + 1][0])
+        draw_graph(panels[k], players(run), edges, new if k else set(), lost)
+        title = panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
+        if panels[k].get_window_extent().width < _NARROW * panels[k].figure.dpi:
+            title.set_fontsize(min(title.get_fontsize(), _SMALL))
+    for panel in panels[shown:]:
+        panel.set_axis_off()
+    if not changes:
+        panels[0].text(0.5, 0.5, "over at $t=0$", transform=panels[0].transAxes, ha="center", va="center")
+    if shown and shown < len(changes):
+        note(panels[shown - 1], f"and {len(changes) - shown} more")
+    return axes
+
+
+def _edge(edge: Any) -> Edge:
+    observer, seen = edge
+    return str(observer), str(seen)
+
+
+def _places(names: list[str]) -> dict[str, NDArray[np.float64]]:
+    """Return where each player stands on the unit circle, clockwise: attacker, target, dn … d1."""
+    around = ["attacker", "target", *reversed(names[:-2])]
+    half = np.pi / len(around)
+    angle = np.pi / 2 + half - 2 * half * np.arange(len(around))
+    return {p: np.array([np.cos(a), np.sin(a)]) for p, a in zip(around, angle, strict=True)}
+
+
+def draw_graph(ax: Axes, names: list[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
+    """Draw one graph, ``new`` edges thick and ``lost`` ones dotted."""
+    at = _places(names)
+    node = min(0.2, 0.8 * np.sin(np.pi / len(names)))
+    ax.set(xlim=(-1.32, 1.32), ylim=(-1.32, 1.32), xticks=[], yticks=[])
+    ax.set_aspect("equal", adjustable="box")
+    for spine in ax.spines.values():
+        spine.set(color="0.8", linewidth=0.5)
+    for edge in sorted(edges | lost):
+        kind = _LOST if edge in lost else _NEW if edge in new else _OLD
+        twin = (edge[1], edge[0]) in edges | lost
+        _arrow(ax, at[edge[0]], at[edge[1]], node, bend=0.16 if twin else 0.0, kind=kind)
+    for player, place in at.items():
+        it = look(player)
+        ax.text(
+            place[0],
+            place[1],
+            it.symbol,
+            ha="center",
+            va="center",
+            fontsize="small",
+            zorder=3.1,
+            bbox={
+                "boxstyle": "circle,pad=0.22",
+                "facecolor": "white",
+                "edgecolor": it.colour,
+                "linewidth": 1.1,
+            },
+        )
+
+
+def _arrow(
+    ax: Axes,
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    node: float,
+    *,
+    bend: float,
+    kind: dict[str, Any],
+) -> None:
+    """Draw one edge, from the rim of a node to the rim of another, bent when its twin runs the other way."""
+    run = end - start
+    length = float(np.hypot(*run))
+    turn = np.arctan(2 * bend)
+    unit = run / length
+
+    def rotated(v: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1]])
+
+    a = start + node * rotated(unit, -turn)
+    b = end - (node + 0.03) * rotated(unit, turn)
+    arrow = FancyArrowPatch(
+        (a[0], a[1]),
+        (b[0], b[1]),
+        arrowstyle="-|>",
+        connectionstyle=f"arc3,rad={bend}",
+        shrinkA=0,
+        shrinkB=0,
+        **kind,
+    )
+    ax.add_patch(arrow)

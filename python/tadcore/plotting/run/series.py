@@ -1,0 +1,247 @@
+"""Histories over time: controls, distances to the attacker, and the synthesis objective."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from tadcore.plotting.tools.axes import above, new_axes
+from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.style import COLUMN, look, note, players
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tadcore.simulation.run import Run
+
+Floats = NDArray[np.float64]
+
+MAX_VERTICALS = 40
+"""A run whose network changes more often than this gets thin curves, and ticks instead of full-height verticals."""
+
+_TERMS = {
+    4: (r"$\|\Delta Q_d\|^2$", r"$\|\Delta Q_\tau\|^2$", r"$\|\Delta Q_a\|^2$", r"$\|S_1\|^2$"),
+    3: (r"$\|\Delta Q\|^2$", r"$\|S_2\|^2$", r"$\|S_3\|^2$"),
+}
+
+
+def controls(
+    run: Run,
+    axis: str = "x",
+    *,
+    players: Sequence[str] | None = None,
+    ax: Axes | None = None,
+    changes: bool = True,
+) -> Axes:
+    """Draw one component of the players' controls over time, with a dashed vertical at each network change.
+
+    Parameters
+    ----------
+    run : Run
+        The run to draw.
+    axis : str
+        The component: "x", "y" or "z".
+    players : sequence of str, optional
+        Whose controls, one player or several; by default those of the players whose sight is limited: the defenders,
+        in I2 the target too.
+    ax : Axes, optional
+        Where to draw; new axes of a one-column figure if not given.
+    changes : bool
+        Whether to mark the network changes.
+
+    Returns
+    -------
+    Axes
+        The axes drawn in.
+
+    Raises
+    ------
+    ValueError
+        The game has no such player or no such axis.
+    """
+    shown = [players] if isinstance(players, str) else list(players) if players is not None else _constrained(run)
+    _known(run, shown)
+    known_axis(run, axis)
+    ax = new_axes(ax, COLUMN, 2.3)
+    control = run.dataset["control"].sel(axis=axis)
+    curves = {p: np.asarray(control.sel(player=p).values, dtype=float) for p in shown}
+    _curves(ax, run, curves)
+    if changes:
+        mark_changes(ax, run)
+    who = ", ".join(look(p).symbol for p in shown) if len(shown) < 3 else "players"
+    ax.set_ylabel(f"control along ${axis}$" if who == "players" else f"control of {who} along ${axis}$")
+    return ax
+
+
+def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+    r"""Draw each player's distance to the attacker, with its capture radius σ and visibility radius ζ.
+
+    Capture radii are dotted, a single line where all are equal; visibility radii that fall inside the picture are thin
+    lines in the player's colour and dashes.
+
+    Parameters
+    ----------
+    run : Run
+        The run to draw.
+    ax : Axes, optional
+        Where to draw; new axes of a one-column figure if not given.
+    changes : bool
+        Whether to mark the network changes.
+
+    Returns
+    -------
+    Axes
+        The axes drawn in.
+    """
+    ax = new_axes(ax, COLUMN, 2.5)
+    names = players(run)[:-1]
+    distance = run.dataset["distance"]
+    curves = {p: np.asarray(distance.sel(player=p).values, dtype=float) for p in names}
+    top = 1.06 * max(float(c.max()) for c in curves.values())
+    rims: list[tuple[float, str, str]] = []
+    sigma = np.asarray(run.scenario.capture_radii, dtype=float)
+    if np.ptp(sigma) == 0:
+        rims.append((float(sigma[0]), r"$\sigma$", "0.25"))
+    else:
+        symbols = [rf"$\sigma_{{{look(p).symbol.strip('$')}}}$" for p in [*names[:-1], "attacker"]]
+        colours = [look(p).colour for p in [*names[:-1], "attacker"]]
+        rims += list(zip(sigma.tolist(), symbols, colours, strict=True))
+    for radius, _, colour in rims:
+        ax.axhline(radius, color=colour, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1.5)
+    for p, radius in zip(names, np.asarray(run.scenario.visibility_radii, dtype=float), strict=False):
+        if np.isfinite(radius) and radius < top:
+            it = look(p)
+            ax.axhline(radius, color=it.colour, linewidth=0.6, linestyle=it.dashes, alpha=0.8, zorder=1.4)
+            rims.append((float(radius), rf"$\zeta_{{{it.symbol.strip('$')}}}$", it.colour))
+    ax.set_ylim(0, top)
+    _curves(ax, run, curves, rims)
+    if changes:
+        mark_changes(ax, run)
+    ax.set_ylabel("distance to $a$")
+    return ax
+
+
+def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+    r"""Draw the synthesis objective :math:`\Theta` and the squared norms that make it up, on a logarithmic scale.
+
+    Where everyone sees everyone :math:`\Theta = 0` and the curves leave the picture.
+
+    Parameters
+    ----------
+    run : Run
+        The run to draw.
+    ax : Axes, optional
+        Where to draw; new axes of a one-column figure if not given.
+    changes : bool
+        Whether to mark the network changes.
+
+    Returns
+    -------
+    Axes
+        The axes drawn in.
+    """
+    ax = new_axes(ax, COLUMN, 2.3)
+    times = np.asarray(run.dataset["time"].values, dtype=float)
+    total = np.asarray(run.dataset["theta"].values, dtype=float)
+    terms = np.asarray(run.dataset["theta_terms"].values, dtype=float)
+    # exactly zero where everyone sees everyone, whatever rounding leaves there
+    seen = np.asarray(run.dataset["adjacency"].values, dtype=bool)
+    everyone = seen.reshape(len(times), -1).all(axis=1)
+    total, terms = np.where(everyone, 0.0, total), np.where(np.expand_dims(everyone, 1), 0.0, terms)
+    scale = float(max(total.max(), terms.max()))
+    ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=span(times))
+    if scale <= 0:
+        ax.plot(times, total, color="black")
+        ax.set_ylim(-1, 1)
+        ax.text(0.5, 0.56, r"$\Theta=0$: everyone sees everyone", transform=ax.transAxes, ha="center", va="bottom")
+        return ax
+    ax.set_yscale("log")
+    names = [r"$\Theta$", *_TERMS.get(terms.shape[1], [f"term {i + 1}" for i in range(terms.shape[1])])]
+    lines = []
+    for i, (name, values) in enumerate(zip(names, [total, *terms.T], strict=True)):
+        it = look(f"d{i}") if i else None
+        positive = np.where(values > 1e-12 * scale, values, np.nan)
+        (line,) = ax.plot(
+            times,
+            positive,
+            color=it.colour if it else "black",
+            linestyle=it.dashes if it else "-",
+            linewidth=1.0 if it else 1.6,
+            zorder=2.5 if it else 2.8,
+            label=name,
+        )
+        lines.append(line)
+    above(ax, lines)
+    quiet = times[np.flatnonzero(total > 1e-12 * scale)[-1]]
+    if times[-1] - quiet > 0.15 * times[-1]:
+        middle = 0.5 * (quiet + times[-1])
+        ax.text(middle, 0.5, r"$\Theta=0$", transform=ax.get_xaxis_transform(), ha="center", va="center", color="0.3")
+    if changes:
+        mark_changes(ax, run)
+    return ax
+
+
+def _constrained(run: Run) -> list[str]:
+    return [str(p) for p in run.dataset["observer"].values]
+
+
+def _known(run: Run, shown: Sequence[str]) -> None:
+    for p in shown:
+        if p not in players(run):
+            raise ValueError(f"no player {p!r}; this game has {', '.join(players(run))}")
+
+
+def known_axis(run: Run, axis: str) -> None:
+    """Refuse a component that the game does not have."""
+    axes = [str(a) for a in run.dataset["axis"].values]
+    if axis not in axes:
+        raise ValueError(f"axis: got {axis!r}, must be one of {', '.join(axes)}")
+
+
+def span(times: Floats) -> tuple[float, float]:
+    """Return the limits of the axis of time."""
+    return float(times[0]), float(times[-1]) if times[-1] > times[0] else float(times[0]) + 1.0
+
+
+def _curves(ax: Axes, run: Run, curves: dict[str, Floats], rims: Sequence[tuple[float, str, str]] = ()) -> None:
+    """Draw one curve per player, named at its right end; ``rims`` are named there too."""
+    times = np.asarray(run.dataset["time"].values, dtype=float)
+    ends: list[tuple[float, str, str]] = []
+    restless = len(run.network_changes) > MAX_VERTICALS
+    for i, (player, values) in enumerate(curves.items()):
+        it = look(player)
+        step = max(len(times) // 6, 1)
+        ax.plot(
+            times,
+            values,
+            color=it.colour,
+            linestyle=it.dashes,
+            linewidth=0.5 if restless else None,
+            marker=it.marker,
+            markersize=6.0 if it.marker == "*" else 3.8,
+            markerfacecolor="white",
+            markeredgewidth=0.9,
+            markevery=(min(step // 2 + i * step // max(len(curves), 1), len(times) - 1), step),
+            zorder=2.5,
+        )
+        ends.append((float(values[-1]), it.symbol, it.colour))
+    ax.set(xlabel="time $t$", xlim=span(times))
+    ax.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+    label_ends(ax, [*ends, *rims])
+
+
+def mark_changes(ax: Axes, run: Run, *, say: bool = True) -> None:
+    """Mark each network change: a dashed vertical, or a tick at the foot and a remark where they are many."""
+    times = [float(change[0]) for change in list(run.network_changes)[1:]]
+    kind: dict[str, Any] = {"color": "0.45", "zorder": 1.2}
+    if len(times) <= MAX_VERTICALS:
+        for t in times:
+            ax.axvline(t, linewidth=0.7, linestyle=(0, (4, 2.5)), **kind)
+        return
+    ax.vlines(times, 0.0, 0.04, transform=ax.get_xaxis_transform(), linewidth=0.4, **kind)
+    if say:
+        note(ax, f"{len(times)} network changes, ticks at the foot")

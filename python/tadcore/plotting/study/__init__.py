@@ -1,0 +1,1 @@
+"""Figures of many games: outcome maps, shares, curves with bands."""

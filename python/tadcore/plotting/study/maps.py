@@ -1,0 +1,144 @@
+"""Outcome maps, with the players who stay where they are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from tadcore.plotting.tools.axes import above, new_axes
+from tadcore.plotting.tools.labels import Labels
+from tadcore.plotting.tools.outcomes import boxes, outcome_look
+from tadcore.plotting.tools.style import COLUMN, PAGE, look, symbol
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from tadcore.analysis.maps import OutcomeMap
+
+_HATCHED = 240  # places along an axis from which hatches are cut; finer ones would print as noise
+_KINDS = ("timeout", "captured")
+
+
+def outcome_map(
+    found: OutcomeMap, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
+) -> Axes:
+    """Draw how, or when, the game ends by the start of one player.
+
+    The other players stand where they start, with their capture discs (filled) and visibility radii (dashed, those
+    that fall inside the picture); a hollow marker shows where the scenario has the player whose start varies. In space
+    they are drawn in projection, and radii as great circles.
+
+    Parameters
+    ----------
+    found : OutcomeMap
+        What to draw.
+    ax : Axes, optional
+        Where to draw; new axes of a one-column figure if not given, of a two-column one for a map wider than three
+        times its height.
+    quantity : {"outcome", "time"}
+        How the game ends, or when.
+    radii : bool
+        Whether to draw capture discs and visibility radii.
+    legend : bool
+        Whether to name the outcomes above the axes, or the colours of the time beside them.
+
+    Returns
+    -------
+    Axes
+        The axes drawn in.
+
+    Raises
+    ------
+    ValueError
+        No such quantity.
+    """
+    if quantity not in ("outcome", "time"):
+        raise ValueError(f"no quantity {quantity!r}; one of outcome, time")
+    x, y = (np.asarray(found.dataset[axis].values, dtype=float) for axis in "xy")
+    left, right, bottom, top = extent = (*_edges(x, y), *_edges(y, x))
+    ratio = (top - bottom) / (right - left)
+    width = PAGE if ratio < 1.0 / 3.0 else COLUMN
+    beside = 0.6 if quantity == "time" and legend else 0.0  # inches that the colour bar takes
+    ax = new_axes(ax, width, float(np.clip((width - 0.6 - beside) * ratio + (0.5 if beside else 0.8), 1.6, 5.5)))
+    if quantity == "outcome":
+        names = _areas(ax, found, x, y, extent)
+        if legend:
+            above(ax, boxes(names), columns=min(len(names), 5), columnspacing=0.7, handlelength=1.4)
+    else:
+        image = ax.imshow(found.dataset["time"].values, origin="lower", extent=extent, cmap="cividis", zorder=1.0)
+        if legend:
+            bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
+            bar.figure.colorbar(image, cax=bar, label="time of the end")
+    _players(ax, found, extent, radii=radii, dark=quantity == "time")
+    who = symbol(found.player)
+    ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
+    ax.set_aspect("equal")
+    return ax
+
+
+def _edges(places: NDArray[np.float64], others: NDArray[np.float64]) -> tuple[float, float]:
+    """Where the first and the last cell of an axis end; a single place is as wide as the other axis's cells."""
+    spread = places if len(places) > 1 else others
+    half = float(spread[1] - spread[0]) / 2.0 if len(spread) > 1 else 0.5
+    return float(places[0]) - half, float(places[-1]) + half
+
+
+def _areas(
+    ax: Axes, found: OutcomeMap, x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, ...]
+) -> list[str]:
+    """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
+    kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
+    code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
+    names = [*_KINDS, *found.scenario.players[: found.scenario.n]]
+    looks = [outcome_look(name) for name in names]
+    colours = np.array([look.fill for look in looks])
+    left, right, bottom, top = extent
+    ax.imshow(colours[code], origin="lower", extent=(left, right, bottom, top), interpolation="nearest", zorder=1.0)
+    there = [i for i in range(len(names)) if np.any(code == i)]
+    every = [slice(None, None, -(-len(places) // _HATCHED)) for places in (y, x)]
+    coarse = code[every[0], every[1]]
+    if min(coarse.shape) > 1:
+        for i in there:
+            if looks[i].hatch and np.any(coarse == i):
+                area = ax.contourf(
+                    x[every[1]], y[every[0]], np.where(coarse == i, 1.0, 0.0), levels=[0.5, 1.5], colors="none",
+                    hatches=[looks[i].hatch], zorder=1.1,
+                )  # fmt: skip
+                area.set_edgecolor((0.0, 0.0, 0.0, 0.45))
+                area.set_linewidth(0.0)
+    return [names[i] for i in there]
+
+
+def _players(ax: Axes, found: OutcomeMap, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
+    sc, left, right, bottom, top = found.scenario, *extent
+    labels = Labels(ax)
+    sight = dict(zip(sc.constrained, sc.visibility_radii, strict=True))
+    reach = dict(zip((*sc.players[: sc.n], "attacker"), sc.capture_radii, strict=True))
+    far = float(np.hypot(right - left, top - bottom))
+    for player, position in zip(sc.players, sc.positions, strict=True):
+        at, it, varies = (float(position[0]), float(position[1])), look(player), player == found.player
+        if not (left <= at[0] <= right and bottom <= at[1] <= top):
+            continue
+        size = {"*": 7.5, "X": 5.5}.get(it.marker, 4.0)
+        edge = "white" if dark else "black"
+        ax.plot(
+            *at, linestyle="none", marker=it.marker, markersize=size, zorder=3.2, markeredgewidth=0.8,
+            markerfacecolor="white" if varies else it.colour, markeredgecolor=it.colour if varies else edge,
+        )  # fmt: skip
+        labels.avoid_spot(at, 5.0)
+        labels.add(at, it.symbol, color="black", leader_from=14.0)
+        if not radii or varies:
+            continue
+        if player in reach:
+            disc = Circle(
+                at, reach[player], facecolor="white", edgecolor=it.colour, linewidth=0.8, alpha=0.75, zorder=2.4
+            )
+            ax.add_patch(disc)
+        if sight.get(player, np.inf) < far:
+            for colour, weight in (("white", 2.2), (it.colour, 1.1)):  # a pale casing: it reads on any area
+                ring = Circle(at, sight[player], fill=False, edgecolor=colour, linewidth=weight, zorder=2.3)
+                ring.set_linestyle("-" if colour == "white" else (0, (4, 2)))
+                ax.add_patch(ring)

@@ -1,0 +1,1 @@
+"""What figures share: axes, labels, insets, the ends of runs, outcome colours, style and files."""

@@ -1,0 +1,68 @@
+"""What a figure starts from: axes of its own where none are given, and a legend above them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .style import COLUMN, PAGE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
+
+_WIDTH = 0.825  # of the figure, that a legend above may take
+
+
+def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
+    """Return ``ax``, or the axes of a new figure of this size in inches."""
+    if ax is not None:
+        return ax
+    import matplotlib.pyplot as plt
+
+    figure = plt.figure(figsize=(width, height), layout="constrained")
+    return figure.add_subplot(projection=projection)
+
+
+def new_panels(
+    count: int, columns: int, *, page_from: int, row: float, rest: float, square: bool = False, **options: Any
+) -> NDArray[Any]:
+    """Return the axes of a new figure of ``count`` panels, in rows of ``columns``.
+
+    The figure is one column wide, two from ``page_from`` panels in a row on. Its height in inches is ``rest`` and
+    ``row`` for each row of panels; with ``square`` a row is as much higher as its panels are wide.
+    """
+    import matplotlib.pyplot as plt
+
+    columns = max(min(columns, count), 1)
+    rows = max(-(-count // columns), 1)
+    width = PAGE if columns >= page_from else COLUMN
+    height = rest + rows * (row + (width / columns if square else 0.0))
+    figure = plt.figure(figsize=(width, height), layout="constrained")
+    return np.asarray(figure.subplots(rows, columns, squeeze=False, **options), dtype=object)
+
+
+def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **options: Any) -> Legend:
+    """A legend above the axes, where it covers nothing: in one row, or in as many as its share of the width needs."""
+    settings: dict[str, Any] = {
+        "loc": "lower center",
+        "bbox_to_anchor": (0.5, 1.0),
+        "frameon": False,
+        "columnspacing": 0.9,
+        "handlelength": 1.7,
+        "handletextpad": 0.4,
+        "borderaxespad": 0.2,
+    }
+    most, figure = columns or len(handles), ax.get_figure(root=True)
+    assert figure is not None
+    place = ax.get_subplotspec()
+    share = len(place.colspan) / place.get_gridspec().ncols if place is not None else 1.0
+    for rows in range(-(-len(handles) // most), len(handles) + 1):
+        legend = ax.legend(handles=list(handles), ncols=-(-len(handles) // rows), **{**settings, **options})
+        # one that is wider takes its width from the axes: it is centred on them, and they stand right of the middle
+        if legend.get_window_extent().width <= _WIDTH * share * figure.bbox.width:
+            break
+    return legend

@@ -1,0 +1,154 @@
+"""How a player looks: colour, marker, line and symbol, the same in every figure.
+
+Colours are those of Okabe and Ito, which readers with any of the common colour deficiencies can tell apart.
+Colour is never the only difference: each player has its own marker and its own dash pattern too, so that a grey
+print loses nothing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
+
+    from tadcore.simulation.run import Run
+
+COLUMN = 3.5
+"""Width in inches of one journal column."""
+PAGE = 7.16
+"""Width in inches of two journal columns."""
+
+_DEFENDER_COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+_DEFENDER_MARKERS = ("o", "s", "^", "D", "v", "P", "h")
+_DEFENDER_DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (6, 1.5, 1, 1.5)),
+    (0, (1.2, 1.2)),
+    (0, (3, 1, 1, 1, 1, 1)),
+)
+
+_PAPER: Any = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 5,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.5,
+    "savefig.bbox": None,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The appearance of one player."""
+
+    symbol: str
+    """Mathtext: ``$d_1$``, ``$\\tau$``, ``$a$``."""
+    colour: str
+    marker: str
+    dashes: Any
+
+
+def symbol(player: str) -> str:
+    """Return the mathtext symbol, without dollar signs, of the player labelled ``player``."""
+    if player == "target":
+        return r"\tau"
+    if player == "attacker":
+        return "a"
+    return f"d_{{{player.removeprefix('d')}}}"
+
+
+def look(player: str) -> Look:
+    """Return how the player labelled ``player`` ("d1", …, "target", "attacker") is drawn."""
+    text = f"${symbol(player)}$"
+    if player == "target":
+        return Look(text, "#000000", "*", (0, (8, 2)))
+    if player == "attacker":
+        return Look(text, "#D55E00", "X", (0, (2, 1)))
+    i = int(player.removeprefix("d")) - 1
+    return Look(
+        text,
+        _DEFENDER_COLOURS[i % len(_DEFENDER_COLOURS)],
+        _DEFENDER_MARKERS[i % len(_DEFENDER_MARKERS)],
+        _DEFENDER_DASHES[i % len(_DEFENDER_DASHES)],
+    )
+
+
+def edge_text(observer: str, seen: Sequence[str], *, lost: bool = False) -> str:
+    r"""Return the label of an edge: ``$d_2\to a$``, several at once ``$d_2\to a, d_1$``, a lost one struck out."""
+    arrow = r"\nrightarrow" if lost else r"\to"
+    others = r",\,".join(symbol(p) for p in seen)
+    return f"${symbol(observer)}{arrow} {others}$"
+
+
+def players(run: Run) -> list[str]:
+    """Return the labels of all players, d1…dn, target, attacker."""
+    return [str(p) for p in run.scenario.players]
+
+
+def outcome_text(run: Run) -> str:
+    """Return the outcome in a line of mathtext, for a title."""
+    at = f"$t={run.outcome.time:.6g}$"
+    if run.outcome.kind == "intercepted":
+        return f"$d_{{{int(run.outcome.defender or 0) + 1}}}$ intercepts $a$ at {at}"
+    if run.outcome.kind == "captured":
+        return rf"$a$ captures $\tau$ at {at}"
+    return f"no capture until {at}"
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Set type and line weights as a two-column journal prints them, inside a ``with`` block only.
+
+    Every function of this package draws in whatever style is in force, so this is for the reader who wants the look of
+    the bundled figures. Draw and save inside the block: ticks take their font when they are first drawn.
+    """
+    with contextlib.ExitStack() as last, mpl.rc_context(_PAPER):
+        try:
+            yield
+        finally:
+            # a notebook's backend switches this on when the first figure loads it, which may be in the block
+            last.callback(mpl.interactive, mpl.is_interactive())
+
+
+def note(ax: Axes, text: str) -> None:
+    """Write a small remark under the label of the horizontal axis, or under 3-D axes."""
+    plane = ax.name != "3d"
+    ax.annotate(
+        text,
+        (0.5, 0.0),
+        xycoords=ax.xaxis.label if plane else "axes fraction",
+        xytext=(0, -2),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+        fontsize="x-small",
+        color="0.3",
+        annotation_clip=False,
+    )
+
+
+def points(renderer: RendererBase) -> float:
+    """Return the pixels in one typographic point."""
+    pixels: Any = renderer.points_to_pixels(1.0)
+    return float(pixels)

@@ -1,0 +1,284 @@
+"""What else a study takes for a sampler: frozen SciPy distributions, callables, plain sequences, TOML tables."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore.errors import MISSING, ScenarioError
+
+from .design import generator
+from .shapes import Annulus, Block, Box, Choice, Cycle, Disk, Gaussian, Sampler
+
+__all__ = ["as_sampler", "from_table"]
+
+_BUILT_IN: dict[str, type[Sampler]] = {
+    kind.__name__.lower(): kind for kind in (Annulus, Box, Choice, Cycle, Disk, Gaussian)
+}
+_KINDS = (*_BUILT_IN, "values", "scipy")
+_PROBE = 64  # draws that identify what has no parameters to be known by
+_RULE = "a sampler: one of tadcore.sampling, a frozen scipy.stats distribution, a sequence, or a callable f(rng, size)"
+
+
+class Quantiles(Sampler):
+    """A frozen univariate distribution, for each coordinate, by its quantile function."""
+
+    def __init__(self, distribution: Any) -> None:
+        self.distribution = distribution
+
+    def __repr__(self) -> str:
+        return f"<{_name(getattr(self.distribution, 'dist', self.distribution))}>"
+
+    def check(self, field: str, components: int) -> None:
+        """Refuse parameters with another number of coordinates."""
+        low = np.shape(self.distribution.support()[0])
+        if low not in ((), (1,), (components,)):
+            what = "numbers" if components == 1 else f"numbers, or lists of {components}"
+            raise ScenarioError(field, self.distribution, f"a distribution whose parameters are {what}")
+
+    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
+        """The quantiles of the points."""
+        quantiles = getattr(self.distribution, "ppf", None) or self.distribution.icdf
+        values = np.asarray(quantiles(block.points), dtype=np.float64)
+        return np.ascontiguousarray(np.broadcast_to(values, (len(block.points), components)))
+
+    def bounds(self) -> tuple[float, float]:
+        """The support."""
+        low, high = self.distribution.support()
+        return float(np.min(low)), float(np.max(high))
+
+    def table(self) -> dict[str, Any]:
+        """Name and parameters for a distribution of SciPy, a description for any other."""
+        frozen = self.distribution
+        if getattr(getattr(frozen, "dist", None), "name", None) not in _distributions():
+            values = self.draw(Block(np.linspace(0.0, 1.0, 66)[1:-1, None], np.random.default_rng(0), 0), 1)
+            return {"distribution": _name(getattr(frozen, "dist", frozen)), "draws": _digest(values)}
+        names = _parameters(frozen.dist)
+        given = {**dict(zip(names, frozen.args, strict=False)), **frozen.kwds}
+        parameters = {name: np.asarray(value, dtype=np.float64).tolist() for name, value in sorted(given.items())}
+        return {"scipy": frozen.dist.name, **parameters}
+
+
+class Variates(Sampler):
+    """A frozen multivariate distribution, by its own ``rvs``."""
+
+    by_points = False
+
+    def __init__(self, distribution: Any) -> None:
+        self.distribution = distribution
+
+    def __repr__(self) -> str:
+        return f"<{_name(self.distribution)}>"
+
+    def coordinates(self, components: int) -> int:
+        """None: it draws from the stream."""
+        return 0
+
+    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
+        """Whole chunks of variates."""
+        values = self.distribution.rvs(size=len(block.points), random_state=block.rng)
+        return _shaped(_name(self.distribution), values, len(block.points), components)
+
+    def table(self) -> dict[str, Any]:
+        """The class, and a digest of what it draws."""
+        values = self.distribution.rvs(size=_PROBE, random_state=generator(0, 0, 0))
+        return {"distribution": _name(self.distribution), "draws": _digest(values)}
+
+
+class Function(Sampler):
+    """A callable ``f(rng, size)``."""
+
+    by_points = False
+
+    def __init__(self, function: Callable[[np.random.Generator, int], Any]) -> None:
+        self.function = function
+
+    def __repr__(self) -> str:
+        return f"<{_name(self.function)}>"
+
+    def coordinates(self, components: int) -> int:
+        """None: it draws from the stream."""
+        return 0
+
+    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
+        """Always for a whole chunk, so that shorter studies are the beginning of longer ones."""
+        size = len(block.points)
+        return _shaped(_name(self.function), self.function(block.rng, size), size, components)
+
+    def table(self) -> dict[str, Any]:
+        """The qualified name, digests of the source, where there is one, and of what it draws.
+
+        The source alone does not tell two closures apart.
+        """
+        table = {"callable": _name(self.function), "draws": _digest(self.function(generator(0, 0, 0), _PROBE))}
+        with contextlib.suppress(OSError, TypeError):  # no source, or none that Python can find
+            source = inspect.getsource(self.function)
+            table["source"] = hashlib.sha256(source.encode()).hexdigest()[:16]
+        return table
+
+
+class Unavailable(Sampler):
+    """A sampler of a store that only its description tells; it cannot draw again."""
+
+    by_points = False
+
+    def __init__(self, description: Mapping[str, Any]) -> None:
+        self.description = dict(description)
+
+    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
+        """Refuse."""
+        raise ScenarioError("vary", self.table(), "given again as the object itself: a store keeps its name only")
+
+    def table(self) -> dict[str, Any]:
+        """What the store says."""
+        return dict(self.description)
+
+
+def as_sampler(field: str, value: Any) -> Sampler:
+    """The sampler that a value of ``vary`` stands for."""
+    if isinstance(value, Sampler):
+        return value
+    if isinstance(value, type) and issubclass(value, Sampler):
+        raise ScenarioError(field, value, f"given its parameters: {value.__name__}(…)")
+    if all(hasattr(value, name) for name in ("mean", "cov_object", "rvs")):  # a frozen multivariate normal
+        return Gaussian(value.mean, cov=value.cov_object.covariance)
+    if hasattr(value, "support") and (hasattr(value, "ppf") or hasattr(value, "icdf")):
+        if callable(value) and not hasattr(value, "dist"):
+            raise ScenarioError(field, value, f"frozen: {getattr(value, 'name', 'norm')}(…) with its parameters")
+        return Quantiles(value)
+    if hasattr(value, "rvs"):
+        return Variates(value)
+    if callable(value):
+        return Function(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        if not np.shape(value) and not isinstance(value, list | tuple):
+            raise ScenarioError(field, value, f"{_RULE}; a fixed value belongs in the scenario")
+        return _named(field, lambda: Choice(value))
+    fixed = isinstance(value, int | float | np.number)
+    raise ScenarioError(field, value, f"{_RULE}; a fixed value belongs in the scenario" if fixed else _RULE)
+
+
+def from_table(field: str, table: Any, *, stored: bool = False) -> Sampler:
+    """A sampler from TOML; one that only a program can give is `Unavailable` where ``stored``, else refused."""
+    if isinstance(table, list):
+        return _named(field, lambda: Choice(table))
+    if not isinstance(table, dict) or not table:
+        raise ScenarioError(field, table, 'a table such as { box = [[-3, -3], [3, 3]] } or { scipy = "norm" }')
+    if stored and ("callable" in table or "distribution" in table):
+        return Unavailable(table)
+    if "scipy" in table:
+        return _from_scipy(field, table)
+    kind, *more = table
+    if kind not in _KINDS or more:
+        strange = next((key for key in table if key not in _KINDS), more[0] if more else kind)
+        raise ScenarioError(f"{field}.{strange}", table[strange], f"one of the samplers {', '.join(_KINDS)}")
+    return _named(field, lambda: _built_in(f"{field}.{kind}", kind, table[kind]))
+
+
+def _built_in(field: str, kind: str, parameters: Any) -> Sampler:
+    if kind == "values":
+        return Choice(parameters)
+    sampler: Any = _BUILT_IN[kind]
+    if sampler in (Choice, Cycle):
+        return sampler(parameters)  # type: ignore[no-any-return]
+    names = [f.name for f in fields(sampler)]
+    optional = {"std", "cov"}
+    if isinstance(parameters, list) and len(parameters) == len(names):
+        parameters = dict(zip(names, parameters, strict=True))
+    if not isinstance(parameters, dict):
+        raise ScenarioError(field, parameters, f"a table of {', '.join(names)}")
+    for name in parameters:
+        if name not in names:
+            raise ScenarioError(f"{field}.{name}", parameters[name], f"left out: it has {', '.join(names)}")
+    for name in names:
+        if name not in parameters and name not in optional:
+            raise ScenarioError(f"{field}.{name}", MISSING, "given")
+    return sampler(**parameters)  # type: ignore[no-any-return]
+
+
+def _from_scipy(field: str, table: Mapping[str, Any]) -> Sampler:
+    """A continuous distribution by its name in `scipy.stats`, from a list of names and never by evaluation."""
+    from scipy import stats
+
+    name = table["scipy"]
+    if not isinstance(name, str) or name not in _distributions():
+        raise ScenarioError(f"{field}.scipy", name, "the name of a continuous distribution of scipy.stats")
+    distribution = getattr(stats, name)
+    known = _parameters(distribution)
+    parameters = {key: value for key, value in table.items() if key != "scipy"}
+    for key, value in parameters.items():
+        if key not in known:
+            raise ScenarioError(f"{field}.{key}", value, f"left out: {name} has {', '.join(known)}")
+        if np.asarray(value).dtype.kind not in "iuf" or np.ndim(value) > 1:
+            raise ScenarioError(f"{field}.{key}", value, "a number, or a list of them")
+    for key in known[:-2]:
+        if key not in parameters:
+            raise ScenarioError(f"{field}.{key}", MISSING, f"given: {name} has {', '.join(known)}")
+    return Quantiles(distribution(**parameters))
+
+
+def _parameters(distribution: Any) -> list[str]:
+    """Names of the parameters of a distribution, in the order of its arguments."""
+    return [*(distribution.shapes or "").replace(",", " ").split(), "loc", "scale"]
+
+
+def _distributions() -> frozenset[str]:
+    from scipy import stats
+
+    return frozenset(name for name in dir(stats) if isinstance(getattr(stats, name), stats.rv_continuous))
+
+
+def _named(field: str, make: Callable[[], Sampler]) -> Sampler:
+    """Make a sampler, with errors that name the path too."""
+    try:
+        return make()
+    except ScenarioError as error:
+        if error.field.startswith(field):
+            raise
+        raise ScenarioError(f"{field}, {error.field}", error.value, error.rule) from None
+
+
+def _shaped(name: str, values: Any, size: int, components: int) -> NDArray[np.float64]:
+    """Check what a callable returned."""
+    array = np.ma.filled(values.astype(np.float64), np.nan) if np.ma.is_masked(values) else np.asarray(values)
+    wanted = {(size, components), (size,)} if components == 1 else {(size, components)}
+    if array.dtype.kind not in "iuf" or array.shape not in wanted:
+        rule = f"an array of numbers of shape {max(wanted)}, one row for each trial"
+        raise ScenarioError(f"what {name} returns", f"{array.dtype} of shape {array.shape}", rule)
+    return np.ascontiguousarray(array.reshape(size, components), dtype=np.float64)
+
+
+def _name(thing: Any) -> str:
+    target = thing if hasattr(thing, "__qualname__") else type(thing)
+    return f"{target.__module__}.{target.__qualname__}"
+
+
+def _digest(values: Any) -> str:
+    """A digest of values that the last bits, which differ between machines, do not change."""
+    return hashlib.sha256(np.asarray(values, dtype=np.float32).tobytes()).hexdigest()[:16]
+
+
+def as_plain(value: Any) -> Any:
+    """A table with infinities as words, which JSON can hold."""
+    if isinstance(value, dict):
+        return {key: as_plain(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [as_plain(entry) for entry in value]
+    return repr(value) if isinstance(value, float) and math.isinf(value) else value
+
+
+def from_plain(value: Any) -> Any:
+    """The inverse of `as_plain`."""
+    if isinstance(value, dict):
+        return {key: from_plain(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [from_plain(entry) for entry in value]
+    return float(value) if value in ("inf", "-inf") else value

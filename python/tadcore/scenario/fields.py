@@ -1,0 +1,225 @@
+"""The kinds of field a scenario is made of, and how a refusal becomes a `ScenarioError`.
+
+Each kind has one rule, written once: the validator here, the bound in the JSON schema beside it, and the words that a
+reader sees. Nothing is coerced: a string, a bool or a decimal is never taken for a number.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, TypeAlias, get_args
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from tadcore.errors import MISSING, ScenarioError
+
+Location: TypeAlias = tuple[str | int, ...]
+Problem: TypeAlias = tuple[Location, object, str]
+"""Where (relative to the field that refuses), what was found, and what it must be."""
+
+
+class _Problems(tuple[Problem, ...]):
+    """Problems on their way through pydantic, which prints what it carries: a value may be too long for that."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"{len(self)} problems"
+
+
+def refusal(problems: Iterable[Problem]) -> PydanticCustomError:
+    """An error that pydantic carries outward and `scenario_error` unfolds."""
+    found = _Problems(problems)
+    return PydanticCustomError(
+        "tadcore", "must be {rules}", {"problems": found, "rules": "; ".join(rule for _, _, rule in found)}
+    )
+
+
+def refuse(value: object, rule: str) -> PydanticCustomError:
+    """The refusal of one value."""
+    return refusal([((), value, rule)])
+
+
+def as_number(value: object, rule: str) -> float:
+    """A Python float from an int, a float or a NumPy scalar; anything else is refused."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, bool) or not isinstance(plain, int | float):
+        raise refuse(value, rule)
+    try:
+        return float(plain)
+    except OverflowError:
+        raise refuse(value, rule) from None
+
+
+def _kind(rule: str, holds: Callable[[float], bool]) -> Callable[[object], float]:
+    def check(value: object) -> float:
+        number = as_number(value, rule)
+        if not holds(number):
+            raise refuse(value, rule)
+        return number
+
+    return check
+
+
+LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
+"""Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
+
+MOST_DEFENDERS = 1000
+"""Far beyond what can be played; P of so many players fits into memory on the shortest grids only."""
+
+is_positive = _kind("a positive finite number", lambda v: v > 0.0 and math.isfinite(v))
+_is_bounded_weight = _kind("a weight between 1e-30 and 1e30", lambda v: LIGHTEST <= v <= HEAVIEST)
+_is_near = _kind("a coordinate between -1e100 and 1e100", lambda v: abs(v) <= FARTHEST)
+is_radius = _kind("a positive number, or inf for unlimited sight", lambda v: v > 0.0)
+is_fraction = _kind("a number in [0, 1]", lambda v: 0.0 <= v <= 1.0)
+_is_finite = _kind("a finite number", math.isfinite)
+
+
+def is_weight(value: object) -> float:
+    """A positive finite number within the bounds of weights."""
+    return _is_bounded_weight(is_positive(value))
+
+
+def _is_coordinate(value: object) -> float:
+    return _is_near(_is_finite(value))
+
+
+def _sequence(value: object, rule: str) -> list[Any]:
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        return list(value)
+    if isinstance(value, list | tuple):
+        return list(value)
+    raise refuse(value, rule)
+
+
+def _each(values: list[Any], check: Callable[[object], float]) -> tuple[float, ...]:
+    """Every entry through `check`, with all refusals gathered under their index."""
+    numbers: list[float] = []
+    problems: list[Problem] = []
+    for index, value in enumerate(values):
+        try:
+            numbers.append(check(value))
+        except PydanticCustomError as error:
+            context = error.context or {}
+            problems += [((index, *where), found, rule) for where, found, rule in context["problems"]]
+    if problems:
+        raise refusal(problems)
+    return tuple(numbers)
+
+
+def is_position(value: object) -> tuple[float, ...]:
+    """Two or three finite coordinates."""
+    rule = "a list of 2 or 3 finite numbers"
+    values = _sequence(value, rule)
+    if len(values) not in (2, 3):
+        raise refuse(value, rule)
+    return _each(values, _is_coordinate)
+
+
+def is_gamma(value: object) -> tuple[float, ...]:
+    """Three or four weights in [0, 1], not all of them zero."""
+    rule = "a list of 4 (I1) or 3 (I2) numbers in [0, 1]"
+    values = _sequence(value, rule)
+    if len(values) not in (3, 4):
+        raise refuse(value, rule)
+    numbers = _each(values, is_fraction)
+    if not any(numbers):
+        raise refuse(value, "positive in at least one entry")
+    return numbers
+
+
+def is_team(value: object) -> object:
+    """At least one defender, and no more than any game could play."""
+    rule = "a list of at least one defender ([[defenders]] tables in TOML)"
+    team = _sequence(value, rule)
+    if not team:
+        raise refuse(value, rule)
+    if len(team) > MOST_DEFENDERS:
+        raise refuse(f"{len(team):,} defenders", f"a list of at most {MOST_DEFENDERS:,} defenders")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0.0), BeforeValidator(is_positive)]
+Weight = Annotated[float, Field(ge=LIGHTEST, le=HEAVIEST), BeforeValidator(is_weight)]
+Radius = Annotated[float, Field(gt=0.0), BeforeValidator(is_radius)]
+Fraction = Annotated[float, Field(ge=0.0, le=1.0), BeforeValidator(is_fraction)]
+Position = Annotated[tuple[float, ...], Field(min_length=2, max_length=3), BeforeValidator(is_position)]
+Gamma = Annotated[tuple[float, ...], Field(min_length=3, max_length=4), BeforeValidator(is_gamma)]
+
+
+def path_of(location: Location, root: str = "") -> str:
+    """``("defenders", 1, "position")`` as ``"defenders[1].position"``."""
+    path = root
+    for part in location:
+        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else str(part)
+    return path
+
+
+def _owner(model: type[BaseModel], location: Location) -> type[BaseModel] | None:
+    """The model whose field the last part of `location` names."""
+    for part in location[:-1]:
+        if isinstance(part, str):
+            field = model.model_fields.get(part)
+            if field is None:
+                return None
+            inner = [field.annotation, *get_args(field.annotation)]
+            found = next((c for c in inner if isinstance(c, type) and issubclass(c, BaseModel)), None)
+            if found is None:
+                return None
+            model = found
+    return model
+
+
+def _missing(owner: type[BaseModel] | None, name: str) -> str:
+    field = owner.model_fields.get(name) if owner else None
+    return f"given: {field.description}" if field and field.description else "given"
+
+
+_HINTS = 100  # unknown fields for which a known one is looked up; a file may hold a million
+
+
+def _unknown(owner: type[BaseModel] | None, name: str, hint: bool) -> str:
+    if owner is None or not hint:
+        return "left out: there is no such field"
+    close = difflib.get_close_matches(name, owner.model_fields, n=1)
+    known = f"did you mean {close[0]}?" if close else f"the fields are {', '.join(owner.model_fields)}"
+    return f"left out: there is no such field; {known}"
+
+
+def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str, hint: bool) -> list[ScenarioError]:
+    location: Location = detail["loc"]
+    kind = detail["type"]
+    name = str(location[-1]) if location else ""
+    if kind == "tadcore":
+        problems: tuple[Problem, ...] = detail["ctx"]["problems"]
+        return [ScenarioError(path_of((*location, *sub), root) or "scenario", v, rule) for sub, v, rule in problems]
+    if kind == "default_factory_not_called":  # a consequence of another field's error
+        return []
+    field = path_of(location, root) or "scenario"
+    if kind == "missing":
+        return [ScenarioError(field, MISSING, _missing(_owner(model, location), name))]
+    if kind == "extra_forbidden":
+        return [ScenarioError(field, detail["input"], _unknown(_owner(model, location), name, hint))]
+    if kind == "literal_error":
+        return [ScenarioError(field, detail["input"], str(detail["ctx"]["expected"]).replace("'", '"'))]
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return [ScenarioError(field, detail["input"], "a table of fields")]
+    if kind == "frozen_instance":
+        return [ScenarioError(field, detail["input"], "left as it is: scenarios are immutable, use replace")]
+    if kind == "json_invalid":
+        return [ScenarioError(field, detail["input"], f"valid JSON ({detail['ctx']['error']})")]
+    rule = detail["msg"].removeprefix("Input should be ")
+    return [ScenarioError(field, detail["input"], rule)]
+
+
+def scenario_error(error: ValidationError, model: type[BaseModel], root: str = "") -> ScenarioError:
+    """What pydantic found, in the words of this library; fields are named from `root`."""
+    return ScenarioError.collect(
+        single
+        for number, detail in enumerate(error.errors(include_url=False))
+        for single in _unfold(detail, model, root, number < _HINTS)
+    )

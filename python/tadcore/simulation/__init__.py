@@ -1,0 +1,6 @@
+"""Games played: one with everything recorded, or many in a batch with their outcomes alone."""
+
+from .batch import Batch, simulate_batch
+from .run import Run, simulate
+
+__all__ = ["Batch", "Run", "simulate", "simulate_batch"]

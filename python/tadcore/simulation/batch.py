@@ -1,0 +1,157 @@
+"""Many games with the same weights, outcomes only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tadcore._shared.arrays import as_index, as_positions, as_real, refuse_where
+from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario, game_of
+from tadcore.game.outcome import Outcome, OutcomeKind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["Batch", "simulate_batch"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch:
+    """Outcomes of M games, in the order of the positions given; made by `simulate_batch`.
+
+    ``len(batch)`` is M, and ``batch[i]`` is the `Outcome` of game i.
+
+    Attributes
+    ----------
+    kind : ndarray of int8, shape (M,)
+        Codes of `OutcomeKind`.
+    defender : ndarray of int32, shape (M,)
+        The intercepting defender, 0-based; -1 where none intercepted.
+    time : ndarray of float64, shape (M,)
+        The instant of the end.
+    """
+
+    kind: NDArray[np.int8]
+    defender: NDArray[np.int32]
+    time: NDArray[np.float64]
+
+    def counts(self) -> dict[str, int]:
+        """How many games ended in each way."""
+        return {kind.name.lower(): int(np.count_nonzero(self.kind == kind)) for kind in OutcomeKind}
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @overload
+    def __getitem__(self, index: int) -> Outcome: ...
+    @overload
+    def __getitem__(self, index: slice) -> Batch: ...
+    def __getitem__(self, index: int | slice) -> Outcome | Batch:
+        if isinstance(index, slice):
+            return Batch(self.kind[index], self.defender[index], self.time[index])
+        return Outcome.of(int(self.kind[index]), int(self.defender[index]), float(self.time[index]))
+
+    def __iter__(self) -> Iterator[Outcome]:
+        return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"Batch({len(self):,} games: {', '.join(f'{count:,} {name}' for name, count in self.counts().items())})"
+
+
+def simulate_batch(
+    sc: Scenario,
+    positions: ArrayLike,
+    visibility_radii: ArrayLike | None = None,
+    capture_radii: ArrayLike | None = None,
+    threads: int | None = None,
+) -> Batch:
+    """Play M games that share the scenario's weights, horizon and step.
+
+    Every row is checked before anything runs, and the outcomes are the same, to the bit, for any number of threads.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game; its positions are not used, its radii where none are given here.
+    positions : array_like, shape (M, n + 2, dim)
+        Initial positions, players ordered d1 … dn, target, attacker.
+    visibility_radii : array_like, shape (M, m) or (m,), optional
+        ζ of the m players with limited sight: d1 … dn, and in I2 the target; inf for unlimited. In I1 a further
+        column for the target is accepted where it is inf throughout.
+    capture_radii : array_like, shape (M, n + 1) or (n + 1,), optional
+        σ, ordered d1 … dn, attacker.
+    threads : int, optional
+        Worker threads; all cores by default.
+
+    Returns
+    -------
+    Batch
+        ``kind``, ``defender`` and ``time``, each of length M.
+
+    Raises
+    ------
+    ScenarioError
+        A shape or an entry breaks a rule; the field is named as in ``positions[17, 2, 0]``.
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> sc = tadcore.scenarios.load("paper-i1")
+    >>> batch = tadcore.simulate_batch(sc, [sc.positions, sc.positions + 1.0])
+    >>> print(batch[1])
+    d1 intercepts the attacker at t = 1.395
+    """
+    as_scenario(sc)
+    starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
+    sight = _visibility(sc, visibility_radii, len(starts))
+    capture = _capture(sc, capture_radii, len(starts))
+    _compare(capture, sight, sc.n)
+    workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
+    kind, defender, time = game_of(sc).simulate_batch(starts, sight, capture, threads=workers)
+    return Batch(kind, defender, time)
+
+
+def _visibility(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+    m = len(sc.constrained)
+    shared = f"the radii of {', '.join(sc.constrained)}"
+    given = as_real("visibility_radii", sc.visibility_radii if values is None else values, f"numbers: {shared}")
+    if sc.interaction == "I1" and given.ndim in (1, 2) and given.shape[-1] == m + 1:
+        target = given[..., m:]
+        if not (np.isposinf(target)).all():
+            rule = f"{m} columns, or inf in the target's: in I1 the target sees everything"
+            raise ScenarioError("visibility_radii", f"shape {given.shape}", rule)
+        given = given[..., :m]
+    return _rows("visibility_radii", given, games, m, shared, finite=False)
+
+
+def _capture(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+    shared = f"the radii of {', '.join(sc.players[: sc.n])}, attacker"
+    given = as_real("capture_radii", sc.capture_radii if values is None else values, f"numbers: {shared}")
+    return _rows("capture_radii", given, games, sc.n + 1, shared, finite=True)
+
+
+def _rows(
+    name: str, given: NDArray[np.float64], games: int, columns: int, meaning: str, *, finite: bool
+) -> NDArray[np.float64]:
+    """One row of positive radii for each game, or a single one for all."""
+    if given.shape not in ((columns,), (games, columns)):
+        rule = f"of shape ({columns},) or ({games}, {columns}): {meaning}"
+        raise ScenarioError(name, f"shape {given.shape}", rule)
+    good = (given > 0.0) & (np.isfinite(given) if finite else ~np.isnan(given))
+    refuse_where(name, given, ~good, "a positive finite number" if finite else "a positive number, or inf")
+    return np.ascontiguousarray(np.atleast_2d(given))
+
+
+def _compare(capture: NDArray[np.float64], sight: NDArray[np.float64], n: int) -> None:
+    """Whoever intercepts sees the attacker: σ < ζ for every defender."""
+    bad = capture[:, :n] >= sight[:, :n]
+    shown = np.broadcast_to(sight[:, :n], bad.shape)
+    refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")

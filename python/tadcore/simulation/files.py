@@ -1,0 +1,134 @@
+"""A run as an xarray dataset and as files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from tadcore import _core
+from tadcore._shared.files import write_whole
+from tadcore.game.synthesis import theta_terms
+
+if TYPE_CHECKING:
+    from tadcore.game.network import Edge
+    from tadcore.scenario.model import Scenario
+
+    from .run import Run
+
+_PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
+
+
+def provenance(sc: Scenario) -> dict[str, str]:
+    """What every file carries: who wrote it, and from which scenario."""
+    text = sc.to_toml()
+    return {
+        "tadcore_version": _core.__version__,
+        "scenario_sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "scenario": text,
+    }
+
+
+def dataset_of(run: Run) -> xr.Dataset:
+    """Every recorded array under its label, symbol and source."""
+    sc = run.scenario
+    attacker = run.position[:, -1:, :]
+    distance = np.linalg.norm(run.position - attacker, axis=-1)
+    grid, team = ("time", "player"), ("time", "observer", "entry")
+    theta = "Theta_1" if sc.interaction == "I1" else "Theta_2"
+    source = "eq:errfun1" if sc.interaction == "I1" else "eq:errfun2"
+    return xr.Dataset(
+        {
+            "position": ((*grid, "axis"), run.position, _about("position", "X_p", "eq:position")),
+            "control": (
+                (*grid, "axis"),
+                run.control,
+                _about("control, the velocity", "u_p", "eq:1d, eq:nwadapt"),
+            ),
+            "distance": (grid, distance, _about("distance to the attacker", "|z_p|", "eq:stateequation")),
+            "theta": ("time", run.theta, _about("inconsistency, reduced norms", theta, source)),
+            "theta_terms": (
+                ("time", "term"),
+                run.theta_terms,
+                _about("squared norms, unweighted", "", source),
+            ),
+            "adjacency": (
+                team,
+                run.adjacency,
+                _about("entry j: sees player j; own entry: sees the attacker", "A", "eq:extadj"),
+            ),
+            "gain": (team, run.gains, _about("feedback rows, u_i = gain @ z", "K_i I_i", "eq:nwadapt")),
+        },
+        coords={
+            "time": ("time", run.times, _about("time", "t", "")),
+            "player": list(sc.players),
+            "axis": list("xyz"[: sc.dim]),
+            "observer": list(sc.constrained),
+            "entry": list(sc.players[:-1]),
+            "term": list(theta_terms(sc.interaction)),
+        },
+        attrs={
+            "title": str(run.outcome),
+            "interaction": sc.interaction,
+            "references": _PAPER,
+            **variant_of(run),
+            **provenance(sc),
+        },
+    )
+
+
+def variant_of(run: Run) -> dict[str, Any]:
+    """What a reader of a file must know of a run that is not the paper's game; empty for one that is."""
+    if not run.variant:
+        return {}
+    return {
+        "variant": f"not the paper's game: edges with {run.variant}",
+        "hysteresis": run.hysteresis,
+        "dwell": run.dwell,
+    }
+
+
+def _about(name: str, symbol: str, source: str) -> dict[str, str]:
+    attributes = {"long_name": name, "units": "1", "symbol": symbol, "reference": source}
+    return {key: value for key, value in attributes.items() if value}
+
+
+def summary_of(run: Run) -> dict[str, Any]:
+    """The run in a few numbers, ready for JSON."""
+    return {
+        "outcome": {
+            "kind": run.outcome.kind,
+            "defender": run.outcome.defender,
+            "time": run.outcome.time,
+            "text": str(run.outcome),
+        },
+        **variant_of(run),
+        "network_changes": [
+            {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
+        ],
+        "costs": run.costs,
+        "converged": run.converged,
+        "unconverged_instants": run.unconverged,
+        "certified_rows": run.certified,
+        "synthesis_iterations": run.iterations,
+        **{key: value for key, value in provenance(run.scenario).items() if key != "scenario"},
+    }
+
+
+def _arrows(edges: tuple[Edge, ...]) -> list[str]:
+    return [f"{observer}->{seen}" for observer, seen in edges]
+
+
+def save(run: Run, folder: str | os.PathLike[str]) -> None:
+    """Write the dataset, the scenario and the summary into a folder, made where it is not there."""
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    packed = run.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")
+    write_whole(place / "run.nc", bytes(packed))
+    run.scenario.to_toml(place / "scenario.toml")
+    write_whole(place / "summary.json", json.dumps(summary_of(run), indent=2) + "\n")

@@ -1,0 +1,237 @@
+"""One game, everything recorded.
+
+At every instant t_k of the grid: termination, the network from the distances (eq:limob of Singh and Reddy), the gains
+for that network (eq:optproblem, eq:optproblem2), then one step of the closed loop with its matrix frozen,
+z(t_{k+1}) = exp(C_k δ) z(t_k). Everything is dimensionless, as in the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore._shared.arrays import as_amount
+from tadcore.game.compiled import game_of
+from tadcore.game.network import Interval, NetworkChange, changes_of, intervals_of
+from tadcore.game.outcome import Outcome
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray
+
+    from tadcore.game.chattering import Chatter
+    from tadcore.plotting import Animation
+    from tadcore.plotting.run.accessor import Plots
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["Run", "simulate"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """A game from its start to its end; made by `simulate`.
+
+    The record has L + 1 rows, t_0 … t_L, the last of them the terminal state. m is the number of players with limited
+    sight (n in I1, n + 1 in I2) and N = n + 1.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What was played.
+    outcome : Outcome
+        How it ended.
+    times : ndarray, shape (L + 1,)
+        Instants.
+    position, control : ndarray, shape (L + 1, n + 2, dim)
+        Positions and controls (velocities) in the order of ``scenario.players``. The last control is the feedback at
+        the terminal state under the last network in force.
+    adjacency : ndarray of bool, shape (L + 1, m, N)
+        𝒜 at every instant; the last row repeats the last network in force.
+    gains : ndarray, shape (L + 1, m, N)
+        Rows of the feedback of the players with limited sight.
+    theta : ndarray, shape (L + 1,)
+        Θ₁ or Θ₂, in reduced norms.
+    theta_terms : ndarray, shape (L + 1, 4 or 3)
+        Its terms, unweighted.
+    costs : dict of str to float
+        J over [0, outcome.time], terminal term included: ``"defenders"``, ``"target"``, ``"attacker"`` in I1
+        (eq:fullobj), ``"team"`` in I2, which the attacker minimises and the team maximises (eq:obj:zero_sum).
+    iterations : int
+        Steps of the synthesis solver, all instants together.
+    unconverged : int
+        Instants at which the synthesis stopped short of its tolerance.
+    certified : int
+        Rows of the record whose gains are proved to be globally optimal.
+    hysteresis, dwell : float
+        The rule by which edges form and break; zero in the paper's game. See `simulate`.
+    """
+
+    scenario: Scenario
+    outcome: Outcome
+    times: NDArray[np.float64]
+    position: NDArray[np.float64]
+    control: NDArray[np.float64]
+    adjacency: NDArray[np.bool_]
+    gains: NDArray[np.float64]
+    theta: NDArray[np.float64]
+    theta_terms: NDArray[np.float64]
+    costs: dict[str, float]
+    iterations: int
+    unconverged: int
+    certified: int
+    hysteresis: float = 0.0
+    dwell: float = 0.0
+
+    @property
+    def variant(self) -> str:
+        """What sets this run apart from the paper's game, in words; empty where nothing does."""
+        named = {"hysteresis": self.hysteresis, "dwell": self.dwell}
+        return " and ".join(f"{name} {value:g}" for name, value in named.items() if value > 0.0)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the gains of every instant reached the tolerance."""
+        return self.unconverged == 0
+
+    @cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The record as a labelled dataset over (time, player, axis), with symbols and sources in its attributes."""
+        from .files import dataset_of
+
+        return dataset_of(self)
+
+    @cached_property
+    def network_changes(self) -> tuple[NetworkChange, ...]:
+        """(time, edges added, edges removed) wherever the network changes, the initial network first.
+
+        Empty for a game that is over at t = 0: termination is tested before anyone looks around.
+        """
+        in_force = len(self.times) - 1
+        return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
+
+    def intervals(self) -> tuple[Interval, ...]:
+        """(start, end, edges) of the stretches with one network, the last up to the end of the game."""
+        return intervals_of(self.network_changes, self.outcome.time)
+
+    @cached_property
+    def chattering(self) -> tuple[Chatter, ...]:
+        """Stretches in which one edge flips at almost every instant: (edge, start, end, flips), in order of time.
+
+        At least six flips, never more than five steps apart: a sliding mode of the continuous game, whose number of
+        flips is a property of δ. `tadcore.verification.sliding_study` finds its limit.
+        """
+        from tadcore.game.chattering import chatter
+
+        return chatter(self)
+
+    @property
+    def plot(self) -> Plots:
+        """Figures of this run by name: ``run.plot.trajectories()``, ``.network()``, ``.controls()`` and so on."""
+        from tadcore.plotting.run.accessor import Plots
+
+        return Plots(self)
+
+    def animate(self, *, seconds: float = 8.0, fps: float = 20.0, width: float = 7.2) -> Animation:
+        """The run as moving pictures: ``run.animate().save("run.gif")``, or shown in a notebook.
+
+        Parameters
+        ----------
+        seconds : float
+            How long the game takes on the screen; rests at network changes and at the end come on top.
+        fps : float
+            Pictures in a second.
+        width : float
+            Width of the pictures in inches.
+
+        Returns
+        -------
+        tadcore.plotting.Animation
+            Its ``save`` writes GIF, MP4 or HTML.
+
+        Raises
+        ------
+        ValueError
+            A number is not positive.
+        """
+        from tadcore.plotting import Animation
+
+        return Animation(self, seconds=seconds, fps=fps, width=width)
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Write ``run.nc`` (netCDF 3), ``scenario.toml`` and ``summary.json``, each whole or not at all."""
+        from .files import save
+
+        save(self, folder)
+
+    def __repr__(self) -> str:
+        changes = max(len(self.network_changes) - 1, 0)
+        network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
+        warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
+        edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
+        loud = f", chattering: {', '.join(edges)}" if edges else ""
+        other = f"; a variant, edges with {self.variant}" if self.variant else ""
+        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{loud}{warning}{other})"
+
+
+def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Run:
+    """Play a scenario and record everything.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game and its start.
+    hysteresis : float
+        h ≥ 0, a length. With h > 0 an edge forms at a distance of at most ζ and breaks only beyond ζ + h. The first
+        network is the paper's.
+    dwell : float
+        D ≥ 0, a time, rounded up to whole steps. With D > 0 an edge that changed keeps its state for D, wherever the
+        players are; the first network is no change.
+
+        Either makes it *another game than the paper's*, in which an edge must be there exactly when the distance is at
+        most ζ (eq:limob); the run says so. Batches and studies have no such variant.
+
+    Returns
+    -------
+    Run
+        The outcome, the trajectories, the network, Θ and the costs.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The game has no equilibrium on [0, T].
+    ScenarioError
+        `hysteresis` or `dwell` is negative or not finite.
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+    >>> print(run.outcome)
+    d1 intercepts the attacker at t = 1.395
+    >>> [change.time for change in run.network_changes]
+    [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
+    """
+    rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
+    record = game_of(sc).simulate(sc.positions, sc.visibility_radii, sc.capture_radii, **rule)
+    groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
+    return Run(
+        scenario=sc,
+        outcome=Outcome.of(record.kind, record.defender, record.time),
+        times=record.times,
+        position=record.position,
+        control=record.control,
+        adjacency=record.adjacency,
+        gains=record.gains,
+        theta=record.theta,
+        theta_terms=record.theta_terms,
+        costs=dict(zip(groups, map(float, record.costs), strict=True)),
+        iterations=record.iterations,
+        unconverged=record.unconverged,
+        certified=record.certified,
+        **rule,
+    )

@@ -1,0 +1,180 @@
+"""What a store says about itself: ``manifest.json``, read only when it is whole.
+
+The last entry is a digest of all others, so that a digit that was changed, by a hand or by a disk, is not taken for
+another study.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar
+
+from tadcore import _core
+from tadcore._shared.files import MOST, strange
+from tadcore.errors import StoreError, shorten
+from tadcore.sampling.adapters import as_plain, from_plain
+from tadcore.sampling.design import CHUNK, STREAM
+
+__all__ = ["FORMAT", "SEAL", "Manifest", "environment", "reason", "seal"]
+
+Kind = TypeVar("Kind")
+
+FORMAT = 2
+"""Version of the layout of a store; 1 had no digest of the manifest."""
+
+SEAL = "manifest_sha256"
+"""The entry with the digest of all others."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a store says about itself.
+
+    Attributes
+    ----------
+    scenario : str
+        The scenario as TOML.
+    vary : dict of str to dict
+        The sampler of every varied path, as a table.
+    seed, design, chunk, stream
+        Where the draws come from; ``chunk`` is the number of trials in a chunk, ``stream`` the version of the draws.
+    trials : int
+        The length of the longest study that was asked for.
+    stopped : int or None
+        The trials after which a stopping rule held.
+    columns : tuple of str
+        Names of the inputs.
+    version, created : str
+        The version of this library, and when the store was made (UTC).
+    environment : dict of str to str
+        What else the last bit of a draw may depend on: the machine, Python, NumPy and SciPy.
+    """
+
+    scenario: str
+    vary: dict[str, dict[str, Any]]
+    seed: int
+    design: str
+    trials: int
+    columns: tuple[str, ...]
+    stopped: int | None = None
+    chunk: int = CHUNK
+    stream: int = STREAM
+    version: str = _core.__version__
+    created: str = ""
+    environment: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def study(self) -> str:
+        """Digest of everything that decides an outcome: scenario, vary, seed, design, chunk and stream."""
+        decides = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
+        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """The text of ``manifest.json``."""
+        content = {
+            "format": FORMAT,
+            "tadcore_version": self.version,
+            "created": self.created,
+            "environment": self.environment,
+            "study_sha256": self.study,
+            "scenario_sha256": hashlib.sha256(self.scenario.encode()).hexdigest(),
+            "stream": self.stream,
+            "seed": self.seed,
+            "design": self.design,
+            "chunk": self.chunk,
+            "trials": self.trials,
+            "stopped": self.stopped,
+            "columns": list(self.columns),
+            "vary": as_plain(self.vary),
+            "scenario": self.scenario,
+        }
+        return json.dumps(content | {SEAL: seal(content)}, indent=2, ensure_ascii=False) + "\n"
+
+    @classmethod
+    def read(cls, folder: str | os.PathLike[str]) -> Manifest:
+        """The manifest of a store; raises `StoreError` where there is none that can be read."""
+        path = Path(folder) / "manifest.json"
+        try:
+            found = strange(path)
+            if found is not None:
+                raise StoreError(str(path), f"it is {found}, not a file", "name the folder of a study")
+            with path.open("rb") as stream:
+                data = stream.read(MOST + 1)
+        except FileNotFoundError:
+            raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
+        except OSError as error:
+            raise StoreError(str(path), f"it cannot be read ({reason(error)})", "check the path") from None
+        if len(data) > MOST:
+            raise StoreError(str(path), f"it has more than {MOST >> 20} MiB", "name the folder of a study")
+        return cls.from_json(data, str(path))
+
+    @classmethod
+    def from_json(cls, data: bytes, path: str) -> Manifest:
+        """The manifest that these bytes are; raises `StoreError` naming ``path`` where they are none, or damaged."""
+        try:
+            content = json.loads(data.decode("utf-8"))
+            if content["format"] != FORMAT:
+                found = f"it has format {shorten(content['format'])}, and this version of tadcore reads {FORMAT}"
+                raise StoreError(path, found, "read it with the version that wrote it, or run the study anew elsewhere")
+            if content.pop(SEAL) != seal(content):
+                found = "its digest does not fit its content: it was edited or damaged"
+                raise StoreError(path, found, "put back a copy of this file, or run the study anew in another folder")
+            columns = _entry(content, "columns", list)
+            manifest = cls(
+                scenario=_entry(content, "scenario", str),
+                vary=from_plain(_entry(content, "vary", dict)),
+                seed=_whole(content, "seed"),
+                design=_entry(content, "design", str),
+                trials=_whole(content, "trials"),
+                columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
+                stopped=None if content["stopped"] is None else _whole(content, "stopped"),
+                chunk=_whole(content, "chunk"),
+                stream=_whole(content, "stream"),
+                version=_entry(content, "tadcore_version", str),
+                created=_entry(content, "created", str),
+                environment=_entry(content, "environment", dict),
+            )
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+            lacks = f"it has no entry {error}" if isinstance(error, KeyError) else error
+            raise StoreError(path, f"it is no manifest of a study ({lacks})", "name another folder") from None
+        if manifest.chunk != CHUNK:  # what a part may hold at most: a stranger does not decide how much is read
+            found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
+            raise StoreError(path, found, "read it with the version that wrote it")
+        return manifest
+
+
+def environment() -> dict[str, str]:
+    """What else the last bit of a draw may depend on."""
+    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
+    return {"machine": platform.platform(), "python": platform.python_version(), **packages}
+
+
+def reason(error: OSError) -> str:
+    """What the operating system says, without the path."""
+    return error.strerror or str(error)
+
+
+def _entry(content: dict[str, Any], name: str, kind: type[Kind]) -> Kind:
+    """An entry of its kind; nothing is taken for what it is not."""
+    value = content[name]
+    if type(value) is not kind:
+        raise ValueError(f"its {name} is {shorten(value)}")
+    return value
+
+
+def _whole(content: dict[str, Any], name: str) -> int:
+    value = _entry(content, name, int)
+    if not 0 <= value < 2**64:
+        raise ValueError(f"its {name} is {shorten(value)}")
+    return value
+
+
+def seal(content: dict[str, Any]) -> str:
+    """SHA-256 of a manifest's content in one canonical text, whatever its spaces and the order of its fields."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

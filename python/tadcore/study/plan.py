@@ -1,0 +1,149 @@
+"""One chunk of a study: drawn, checked and played, as a function of (scenario, vary, seed, chunk) alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore.errors import ScenarioError
+from tadcore.sampling.design import CHUNK, Design, generator, unit_points
+from tadcore.sampling.shapes import Block, Sampler
+from tadcore.scenario.fields import FARTHEST
+from tadcore.simulation.batch import simulate_batch
+
+from .vary import Quantity, quantities, setups
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["Outcomes", "Plan", "run_chunk"]
+
+_CHECKED_AHEAD = 128  # chunks, about a million trials: their draws cost little beside their games
+
+
+class Outcomes(NamedTuple):
+    """What a chunk returns: plain arrays of one length, ready for another process."""
+
+    kind: NDArray[np.int8]
+    defender: NDArray[np.int32]
+    time: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    """What was drawn, one column for each varied component."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What the chunks of a study are computed from."""
+
+    scenario: Scenario
+    vary: dict[str, Sampler]
+    seed: int
+    design: Design
+
+    @cached_property
+    def varied(self) -> tuple[tuple[Quantity, Sampler], ...]:
+        """Every quantity that varies, with its sampler."""
+        return quantities(self.scenario, self.vary)
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The same, without samplers."""
+        return tuple(quantity for quantity, _ in self.varied)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, one for each varied component."""
+        return tuple(name for quantity in self.quantities for name in quantity.columns)
+
+    def draw(self, chunk: int, rows: int = CHUNK) -> NDArray[np.float64]:
+        """Inputs of the first ``rows`` trials of a chunk, shape (rows, columns).
+
+        The chunk is always drawn whole and then cut: what a trial draws cannot depend on how many follow.
+        """
+        layout = [(q.purpose, sampler.coordinates(q.components)) for q, sampler in self.varied]
+        points = unit_points(self.design, self.seed, chunk, layout)
+        drawn = [
+            sampler.draw(Block(p, generator(self.seed, chunk, q.purpose), chunk * CHUNK), q.components)
+            for (q, sampler), p in zip(self.varied, points, strict=True)
+        ]
+        return np.concatenate(drawn, axis=1)[:rows] if drawn else np.empty((rows, 0))
+
+    def check(self, chunk: int, inputs: NDArray[np.float64]) -> None:
+        """Raise `ScenarioError` for the first trial of a chunk whose draws are no game: its path, number and value."""
+        column = 0
+        for quantity in self.quantities:
+            for part in range(quantity.components):
+                values = inputs[:, column]
+                if quantity.field == "position":
+                    good, rule = np.isfinite(values), "a finite number"
+                elif quantity.field == "capture_radius":
+                    good, rule = (values > 0.0) & np.isfinite(values), "a positive finite number"
+                else:
+                    good, rule = values > 0.0, "a positive number, or inf"
+                self._refuse(chunk, quantity.columns[part], values, ~good, rule)
+                if quantity.field == "position":
+                    rule = "a coordinate between -1e100 and 1e100"
+                    self._refuse(chunk, quantity.columns[part], values, np.abs(values) > FARTHEST, rule)
+                column += 1
+        _, sight, capture = setups(self.scenario, self.quantities, inputs)
+        for i in range(self.scenario.n):
+            rule = "larger than the defender's capture radius"
+            reach, seen = (np.broadcast_to(radii[..., i], len(inputs)) for radii in (capture, sight))
+            bad = reach >= seen
+            if bad.any():
+                rule += f", {float(reach[int(bad.argmax())])!r}"
+            self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, rule)
+
+    def check_ahead(self, trials: int) -> None:
+        """Check what can be checked before anything runs.
+
+        The first chunk always; all of the first million trials where the supports of the samplers do not prove that
+        every draw is a game. Later chunks are checked as they come.
+        """
+        whole = math.ceil(trials / CHUNK)
+        for chunk in range(1 if self._proven() else min(whole, _CHECKED_AHEAD)):
+            self.check(chunk, self.draw(chunk, min(CHUNK, trials - chunk * CHUNK)))
+
+    def _proven(self) -> bool:
+        """Whether the supports of the samplers alone leave no bad draw possible, up to the finiteness of positions."""
+        sc = self.scenario
+        reach = {("visibility_radius", i): (float(r), float(r)) for i, r in enumerate(sc.visibility_radii)}
+        reach |= {("capture_radius", i): (float(r), float(r)) for i, r in enumerate(sc.capture_radii)}
+        for quantity, sampler in self.varied:
+            low, high = sampler.bounds()
+            if quantity.field == "position":
+                if math.isnan(low):
+                    return False
+                continue
+            if not low > 0.0:
+                return False
+            reach[quantity.field, quantity.row] = low, high
+        pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
+        return all(capture[1] < sight[0] for capture, sight in pairs)
+
+    def _refuse(self, chunk: int, path: str, values: NDArray[np.float64], bad: NDArray[np.bool_], rule: str) -> None:
+        if bad.any():
+            row = int(bad.argmax())
+            raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), rule)
+
+    def run(self, chunk: int, rows: int, threads: int | None) -> Outcomes:
+        """Draw, check and play the first ``rows`` trials of a chunk."""
+        inputs = self.draw(chunk, rows)
+        self.check(chunk, inputs)
+        positions, sight, capture = setups(self.scenario, self.quantities, inputs)
+        batch = simulate_batch(self.scenario, positions, sight, capture, threads=threads)
+        return Outcomes(batch.kind, batch.defender, batch.time, inputs)
+
+
+def run_chunk(
+    scenario: str, vary: dict[str, Sampler], seed: int, design: Design, chunk: int, rows: int, threads: int | None
+) -> Outcomes:
+    """`Plan.run` in another process, from the scenario's TOML; the process keeps its table from chunk to chunk."""
+    from tadcore.scenario.model import Scenario
+
+    return Plan(Scenario.from_toml_string(scenario), vary, seed, design).run(chunk, rows, threads)

@@ -1,0 +1,72 @@
+"""A progress bar with the rate and running estimates of how the games end; silent where nobody looks."""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore.game.outcome import OutcomeKind
+
+__all__ = ["Progress"]
+
+_FORMAT = "{desc}|{bar}| {n_fmt}/{total_fmt} [{remaining}, {rate_fmt}{postfix}]"
+
+
+class Progress:
+    """A bar over trials.
+
+    Parameters
+    ----------
+    total : int
+        Trials of the study.
+    wanted : bool or str
+        Whether a bar was asked for, or what stands before it; it shows only in a terminal or a notebook.
+    """
+
+    def __init__(self, total: int, *, wanted: bool | str) -> None:
+        self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
+        self._bar: Any = None
+        if wanted and _watched():
+            from tqdm.auto import tqdm
+
+            label = f"{wanted}: " if isinstance(wanted, str) else None
+            self._bar = tqdm(total=total, desc=label, unit="", unit_scale=True, dynamic_ncols=True, bar_format=_FORMAT)
+
+    def add(self, counts: NDArray[np.int64], *, stored: bool = False) -> None:
+        """Count the outcomes of a chunk; those from a store do not enter the rate."""
+        self._counts += counts
+        if self._bar is None:
+            return
+        rows = int(counts.sum())
+        if stored:
+            self._bar.initial += rows
+            self._bar.n += rows
+        estimates = self._counts / max(int(self._counts.sum()), 1)
+        order = (OutcomeKind.INTERCEPTED, OutcomeKind.CAPTURED, OutcomeKind.TIMEOUT)
+        # "P(kind)" without its letters: the line has to fit into 80 columns, rate and all.
+        self._bar.set_postfix_str(
+            " ".join(f"{kind.name.lower()} {estimates[kind]:.3f}" for kind in order), refresh=stored
+        )
+        if not stored:
+            self._bar.update(rows)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _watched() -> bool:
+    """Whether standard error is a terminal, or this is a notebook."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return True
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return shell is not None and "IPKernelApp" in shell.config

@@ -1,0 +1,265 @@
+"""A study: many games around one scenario, drawn, played in chunks, kept and counted.
+
+The trials of a study are numbered. What trial i plays and how it ends depend on the scenario, on what varies, on the
+seed and on i alone: not on the number of threads, the executor, the length of the study, or how often it was cut off.
+
+Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
+
+.. code-block:: python
+
+    with concurrent.futures.ProcessPoolExecutor() as pool:                   # the cores of this machine
+        study.run(executor=pool, store="out")
+
+    with distributed.Client("tcp://scheduler:8786") as client:               # a Dask cluster
+        study.run(executor=client.get_executor(), store="out")
+
+    with mpi4py.futures.MPIPoolExecutor() as pool:                           # mpiexec -n 64 python -m mpi4py.futures
+        study.run(executor=pool, store="out")
+
+Every worker process builds its own table of gains. The store is written by the process that calls `Study.run`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tadcore._shared.arrays import as_index
+from tadcore._shared.files import as_path
+from tadcore.errors import ScenarioError
+from tadcore.game.compiled import game_of
+from tadcore.sampling.adapters import as_sampler
+from tadcore.sampling.design import DESIGNS, Design
+from tadcore.sampling.shapes import Sampler
+from tadcore.scenario.model import Scenario
+
+from .collect import StoppingRule, collect, jobs_of
+from .manifest import Manifest
+from .plan import Plan
+from .progress import Progress
+from .result import StudyResult, load_study
+from .store import Store
+from .table import schema_of
+from .vary import Quantity, normal
+from .warm_start import warm
+
+__all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
+
+_MOST_TRIALS = 2**32  # points of the Sobol' sequence
+
+
+class Study:
+    """Many games around one scenario.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game; what does not vary is as it says.
+    vary : mapping of str to sampler
+        Paths of positions, visibility radii and capture radii, such as ``"attacker.position"``,
+        ``"defenders.0.visibility_radius"``, ``"defenders.*.capture_radius"`` or ``"*.position"``, and how to draw
+        them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
+        ``f(rng, size)``. With a wildcard every player draws for itself.
+    trials : int
+        How many games.
+    seed : int
+        Any whole number in [0, 2⁶⁴); adjacent seeds share nothing.
+    design : {"random", "sobol", "latin"}
+        Independent draws, a scrambled Sobol' sequence, or Latin hypercubes (one for every chunk of 8,192 trials).
+
+    Raises
+    ------
+    ScenarioError
+        A path leads nowhere or to a weight, a sampler does not fit, there are no trials.
+
+    Notes
+    -----
+    The draws of the random design come from ``numpy.random.Philox``, keyed by (seed, chunk) and with the varied
+    quantity in the counter; with one seed, two studies that vary the same position draw the same positions, whatever
+    else they vary. A callable must be a function of its arguments alone. A store knows it by its qualified name and
+    digests of its source and of a few of its draws. Disks, annuli and quantiles round as the mathematical library of
+    the machine does: on another kind of machine the last bit of a draw may differ.
+
+    Examples
+    --------
+    >>> import tadcore
+    >>> from tadcore.sampling import Disk
+    >>> sc = tadcore.scenarios.load("paper-i1")
+    >>> result = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 0.5)}, trials=50, seed=7).run()
+    >>> result.trials, sum(result.counts().values())
+    (50, 50)
+    >>> result.replay(3).outcome.time == result.time[3]
+    np.True_
+    """
+
+    def __init__(
+        self,
+        sc: Scenario,
+        vary: Mapping[str, Any],
+        *,
+        trials: int,
+        seed: int = 0,
+        design: Design = "random",
+    ) -> None:
+        if not isinstance(sc, Scenario):
+            raise ScenarioError("sc", sc, "a tadcore.Scenario")
+        if not isinstance(vary, Mapping) or not vary:
+            example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
+            raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
+        if design not in DESIGNS:
+            raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
+        self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
+        samplers: dict[str, Sampler] = {}
+        for path, value in vary.items():
+            name = normal(path)
+            if name in samplers:
+                raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
+            samplers[name] = as_sampler(f'vary["{path}"]', value)
+        self._plan = Plan(sc, samplers, as_index("seed", seed, 2**64 - 1), design)
+        for quantity, sampler in self._plan.varied:
+            if design != "random" and not sampler.by_points:
+                rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
+                raise ScenarioError(f'vary["{quantity.path}"]', sampler, rule)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario around which the inputs vary."""
+        return self._plan.scenario
+
+    @property
+    def vary(self) -> Mapping[str, Sampler]:
+        """The sampler of every path."""
+        return MappingProxyType(self._plan.vary)
+
+    @property
+    def seed(self) -> int:
+        """The seed."""
+        return self._plan.seed
+
+    @property
+    def design(self) -> Design:
+        """The design of the draws."""
+        return self._plan.design
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What varies, wildcards expanded."""
+        return self._plan.quantities
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the inputs, one for each varied component."""
+        return self._plan.columns
+
+    def inputs(self, trials: int | None = None) -> dict[str, NDArray[np.float64]]:
+        """Draw without playing: the inputs of the first trials, all of them by default, by the name of the column.
+
+        Parameters
+        ----------
+        trials : int, optional
+            How many.
+        """
+        wanted = self.trials if trials is None else as_index("trials", trials, self.trials, least=1)
+        drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
+        return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
+
+    def replace(self, **changes: Any) -> Study:
+        """Another study with some of ``sc``, ``vary``, ``trials``, ``seed`` and ``design`` changed."""
+        given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
+        return Study(**{"sc": self.scenario, "design": self.design, **given, **changes})
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> Study:
+        """Read a study file; raises `ScenarioError` for a file, a key or a value that cannot be accepted."""
+        from .toml import read_study
+
+        return read_study(path)
+
+    def run(
+        self,
+        *,
+        progress: bool | str = False,
+        store: str | os.PathLike[str] | None = None,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        until: StoppingRule | None = None,
+        table: str | os.PathLike[str] | None = None,
+    ) -> StudyResult:
+        """Play the trials.
+
+        Parameters
+        ----------
+        progress : bool or str
+            Show a bar with the rate and running estimates, in a terminal or a notebook; a string stands before it.
+        store : path, optional
+            A folder that keeps every finished chunk. If it holds this study already, the run goes on from there; a
+            larger ``trials`` extends it.
+        threads : int, optional
+            Threads for each chunk; all cores by default, or 1 in the workers of an executor.
+        executor : concurrent.futures.Executor, optional
+            Who computes the chunks: a process pool, Dask's ``client.get_executor()``, ``MPIPoolExecutor``. By default
+            this process does, one chunk after another.
+        until : StoppingRule, optional
+            Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
+        table : path, optional
+            A file that keeps the game's table of transitions from study to study: read before, written after. With it
+            a study of the same game starts warm; the outcomes are the same. Not used by an executor's workers.
+
+        Returns
+        -------
+        StudyResult
+            The same to the bit for any number of threads, any executor and any interruptions.
+
+        Raises
+        ------
+        ScenarioError
+            A draw is no game: the path, the trial and the value are named. The first chunk is checked before anything
+            runs, and so are the first million trials unless the samplers' supports prove them right.
+        NoEquilibriumError
+            The game has no equilibrium on [0, T].
+        StoreError
+            The store is another study's, in use, damaged, or cannot be written.
+        WorkerError
+            A worker of the executor died; what was finished is in the store.
+        KeyboardInterrupt
+            Ctrl-C; what was finished is in the store.
+        """
+        workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
+        if executor is not None and not isinstance(executor, Executor):
+            hint = ": client.get_executor()" if hasattr(executor, "get_executor") else ""
+            raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")
+        if until is not None and not isinstance(until, StoppingRule):
+            raise ScenarioError("until", until, "a stopping rule such as tadcore.statistics.HalfWidth(0.002)")
+        if until is not None and self.design != "random":
+            rule = "left out: its interval needs independent draws, which only design='random' gives"
+            raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
+        folder = None if store is None else as_path("store", store)
+        kept_table = None if table is None else as_path("table", table)
+        self._plan.check_ahead(self.trials)
+        game_of(self.scenario).equilibrium()
+        schema = schema_of(self.columns)
+        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), schema)
+        with opened as kept, warm(self.scenario, kept_table), Progress(self.trials, wanted=progress) as bar:
+            trials = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
+            return StudyResult(self, trials)
+
+    def _manifest(self) -> Manifest:
+        return Manifest(
+            scenario=self.scenario.to_toml(),
+            vary={path: sampler.table() for path, sampler in self.vary.items()},
+            seed=self.seed,
+            design=self.design,
+            trials=self.trials,
+            columns=self.columns,
+        )
+
+    def __repr__(self) -> str:
+        paths = ", ".join(self.vary)
+        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"

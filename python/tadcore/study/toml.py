@@ -1,0 +1,90 @@
+"""A study from a TOML file.
+
+.. code-block:: toml
+
+    scenario = "paper-i1"        # a bundled name, a file beside this one, or a [scenario] table
+    trials = 100_000
+    seed = 7                     # 0 by default
+    design = "sobol"             # "random" by default, or "latin"
+
+    [vary]
+    "attacker.position" = { box = [[-3, -3], [3, 3]] }
+    "target.position" = { disk = { center = [0, 1], radius = 0.5 } }
+    "defenders.*.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
+    "defenders.0.capture_radius" = { values = [0.1, 0.2] }
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tadcore import scenarios
+from tadcore._shared.files import parse_toml, read_text
+from tadcore.errors import MISSING, ScenarioError
+from tadcore.sampling.adapters import from_table
+from tadcore.scenario.model import Scenario
+
+if TYPE_CHECKING:
+    from .study import Study
+
+__all__ = ["read_study"]
+
+_KEYS = {
+    "scenario": "a bundled scenario's name, a file, or a table",
+    "trials": "the number of games",
+    "seed": "a whole number",
+    "design": '"random", "sobol" or "latin"',
+    "vary": "a table of paths and samplers",
+}
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """The study that a file describes; raises `ScenarioError`."""
+    from .study import Study
+
+    data = parse_toml(read_text(path), os.fspath(path))
+    for key, value in data.items():
+        if key not in _KEYS:
+            close = difflib.get_close_matches(key, _KEYS, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"the keys are {', '.join(_KEYS)}"
+            raise ScenarioError(key, value, f"left out: a study has no such key; {hint}")
+    for key in ("scenario", "trials", "vary"):
+        if key not in data:
+            raise ScenarioError(key, MISSING, f"given: {_KEYS[key]}")
+    if not isinstance(data["vary"], dict):
+        raise ScenarioError("vary", data["vary"], _KEYS["vary"])
+    vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(data["vary"]).items()}
+    options = {key: data[key] for key in ("seed", "design") if key in data}
+    return Study(_scenario(data["scenario"], Path(path).parent), vary, trials=data["trials"], **options)
+
+
+def _scenario(source: Any, beside: Path) -> Scenario:
+    if isinstance(source, dict):
+        return Scenario.model_validate(source)
+    if not isinstance(source, str):
+        raise ScenarioError("scenario", source, _KEYS["scenario"])
+    if source in scenarios.names() and not (beside / source).exists():
+        return scenarios.load(source)
+    if not (beside / source).is_file():
+        close = difflib.get_close_matches(source, scenarios.names(), n=1, cutoff=0.5)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        raise ScenarioError("scenario", source, f"a bundled scenario's name, or a file beside the study's{hint}")
+    return Scenario.from_toml(beside / source)
+
+
+def _flat(tables: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Paths without their quotes, ``attacker.position = {…}``, which TOML nests."""
+    flat: dict[str, Any] = {}
+    for key, value in tables.items():
+        name = f"{prefix}{key}"
+        player = name in ("attacker", "target", "defenders", "*") or (
+            name.startswith("defenders.") and name.count(".") == 1
+        )
+        if isinstance(value, dict) and player:
+            flat |= _flat(value, f"{name}.")
+        else:
+            flat[name] = value
+    return flat

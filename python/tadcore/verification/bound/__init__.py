@@ -1,0 +1,1 @@
+"""Lower bounds on Θ by semidefinite programming."""

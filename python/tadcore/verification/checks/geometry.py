@@ -1,0 +1,188 @@
+"""What geometry demands: the straight line, the delay of a radius, and the symmetries of the plane and of space.
+
+Theorem straight_line (I1, λ = 0): the attacker and the target stay on the line that joins them at t = 0. Theorem
+delayproperty: two games that differ in one player's visibility radius are the same, here to the bit, until that
+player's first edge in either. A game that is turned, mirrored or moved is the same game, turned, mirrored or
+moved; one whose defenders are renamed, the same with other names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tadcore.errors import ScenarioError
+from tadcore.simulation.run import simulate
+from tadcore.verification.oracle.matrices import Floats
+from tadcore.verification.report import Check, VerificationReport
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+    from tadcore.simulation.run import Run
+
+__all__ = ["check_geometry", "moved", "off_the_line", "radius_delay", "relabelled", "unlike"]
+
+_LINE, _SAME, _DECIDED = 1e-10, 1e-8, 1e-11
+
+
+def off_the_line(run: Run) -> float:
+    """How far the attacker and the target leave the line that joins them at t = 0, relative to the run's extent."""
+    pair = run.position[:, -2:] - run.position[0, -1]
+    along = pair[0, 0]
+    length = float(np.linalg.norm(along))
+    if length == 0.0:
+        return 0.0
+    across = pair - (pair @ (along / length))[..., None] * (along / length)
+    return float(np.abs(across).max() / max(np.abs(pair).max(), 1e-300))
+
+
+def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[int, bool]:
+    """Compare the games under two visibility radii of one player.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game and its start.
+    player : str
+        A player with limited sight.
+    one, other : float
+        Its two radii.
+
+    Returns
+    -------
+    instants : int
+        Instants before that player's first edge in either game.
+    identical : bool
+        Whether states and controls are equal to the bit at all of them.
+
+    Raises
+    ------
+    ScenarioError
+        The player is not one with limited sight, or a radius is not one.
+    """
+    if player not in sc.constrained:
+        raise ScenarioError("player", player, f"one of {', '.join(sc.constrained)}")
+    i = sc.constrained.index(player)
+    where = "target" if player == "target" else f"defenders[{i}]"
+    runs = [simulate(sc.replace({f"{where}.visibility_radius": radius})) for radius in (one, other)]
+    first = min(_first_edge(run, i) for run in runs)
+    records = ((runs[0].position, runs[1].position), (runs[0].control, runs[1].control))
+    return first, all(np.array_equal(x[:first], y[:first]) for x, y in records)
+
+
+def _first_edge(run: Run, i: int) -> int:
+    sees = run.adjacency[:-1, i].any(axis=1)
+    return int(np.argmax(sees)) if sees.any() else len(run.times) - 1
+
+
+def moved(sc: Scenario, turn: Floats, shift: Floats) -> Scenario:
+    """The scenario with every position x at turn x + shift; ``turn`` is orthogonal, shape (dim, dim)."""
+    places = (sc.positions @ turn.T + shift).tolist()
+    names = [*(f"defenders[{i}]" for i in range(sc.n)), "target", "attacker"]
+    return sc.replace({f"{name}.position": place for name, place in zip(names, places, strict=True)})
+
+
+def relabelled(sc: Scenario, order: Sequence[int]) -> Scenario:
+    """The scenario with its defenders in another order: defender i is what ``order[i]`` was."""
+    return sc.replace(defenders=[sc.defenders[i].model_dump(exclude_unset=True) for i in order])
+
+
+def unlike(run: Run, other: Run, expected: Floats, defender: int | None) -> float:
+    """How far ``other`` is from what symmetry makes of ``run``: inf for another ending or other network changes.
+
+    Parameters
+    ----------
+    run, other : Run
+        The run, and that of the moved or relabelled scenario.
+    expected : ndarray, shape (L + 1, n + 2, dim)
+        The positions of ``other`` by symmetry.
+    defender : int or None
+        Who intercepts in ``other`` by symmetry.
+
+    Returns
+    -------
+    float
+        The largest difference of positions, relative to the extent of ``expected``.
+    """
+    same_end = (other.outcome.kind, other.outcome.defender, other.outcome.time) == (
+        run.outcome.kind,
+        defender,
+        run.outcome.time,
+    )
+    if not same_end or [c.time for c in run.network_changes] != [c.time for c in other.network_changes]:
+        return float("inf")
+    spread = expected - expected.mean(axis=1, keepdims=True)
+    return float(np.abs(other.position - expected).max() / max(np.abs(spread).max(), 1e-300))
+
+
+def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
+    """Check the straight line, the radius delay and the symmetries on a run.
+
+    Parameters
+    ----------
+    run : Run
+        The run; its scenario is played again moved, mirrored, relabelled and with other radii.
+    seed : int
+        Key of the rotation and the translation.
+
+    Returns
+    -------
+    VerificationReport
+        One check for each claim that applies. A symmetry that fails where a player stands so close to a threshold that
+        rounding decides is not converged.
+    """
+    sc = run.scenario
+    checks, notes = [], []
+    if sc.interaction == "I1" and sc.attacker.evasion == 0.0:
+        remedy = "a suicidal attacker and its target must stay on their line: P_τ or P_a reaches beyond the target"
+        checks.append(Check("geometry.line", off_the_line(run), _LINE, True, remedy, "thm:straight_line"))
+    compared, differing = 0, 0
+    apart = np.linalg.norm(sc.positions[:, None] - sc.positions, axis=-1)
+    for i, player in enumerate(sc.constrained):
+        nearest = float(np.delete(apart[i], i).min())  # below it nobody is seen at the start
+        least = 1.001 * float(sc.capture_radii[i]) if i < sc.n else 0.0
+        if nearest > 2.0 * least:
+            first, same = radius_delay(sc, player, max(0.4 * nearest, least), 0.9 * nearest)
+            compared += first
+            differing += not same
+    if compared:
+        remedy = "a radius acts before its first edge: something else than the network reads it"
+        where = f"{compared} instants in pairs of games of {len(sc.constrained)} players"
+        checks.append(Check("geometry.delay", float(differing), 0.0, True, remedy, "thm:delayproperty", where))
+    else:
+        notes.append("everyone with limited sight starts within a capture radius of someone: no radius to delay")
+
+    decided = _margin(run) > _DECIDED
+    rng = np.random.Generator(np.random.Philox(key=[seed, 2**40]))
+    turn = np.linalg.qr(rng.normal(size=(sc.dim, sc.dim)))[0]
+    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    mirror = np.diag([-1.0] + [1.0] * (sc.dim - 1))
+    shift = rng.normal(size=sc.dim) * float(np.abs(sc.positions).max())
+    still, none = np.eye(sc.dim), np.zeros(sc.dim)
+    remedy = "the result depends on the frame: report this scenario"
+    for name, U, by in (("rotation", turn, none), ("reflection", mirror, none), ("translation", still, shift)):
+        other_run = simulate(moved(sc, U, by))
+        gap = unlike(run, other_run, run.position @ U.T + by, run.outcome.defender)
+        checks.append(Check(f"geometry.{name}", gap, _SAME, decided or gap <= _SAME, remedy, "eq:stateequation"))
+    if sc.n > 1:
+        order = list(range(sc.n))[::-1]
+        other_run = simulate(relabelled(sc, order))
+        winner = None if run.outcome.defender is None else order.index(run.outcome.defender)
+        gap = unlike(run, other_run, run.position[:, [*order, sc.n, sc.n + 1]], winner)
+        remedy = "the result depends on the order of the defenders: the synthesis found different minima"
+        checks.append(Check("geometry.relabelling", gap, _SAME, decided or gap <= _SAME, remedy, "eq:optproblem"))
+    return VerificationReport("geometry", tuple(checks), notes=tuple(notes))
+
+
+def _margin(run: Run) -> float:
+    """The smallest distance of any pair from a radius that is tested, relative to the run's extent."""
+    sc, at = run.scenario, run.position
+    m, size = len(sc.constrained), sc.n + 1
+    distance = np.linalg.norm(at[:, :, None] - at[:, None], axis=-1)
+    capture = np.abs(distance[:, :size, -1] - sc.capture_radii)
+    sight = np.abs(distance[:-1, :m] - sc.visibility_radii[:, None])
+    sight[:, np.arange(m), np.arange(m)] = np.inf
+    extent = max(float(distance.max()), 1e-300)
+    return min(float(capture.min()), float(sight.min(initial=np.inf))) / extent

@@ -1,0 +1,107 @@
+"""Theorems fbne and zero:sum:game: the feedback is a Nash equilibrium of the game in which everyone sees everything.
+
+Two questions, each by SciPy and from the scenario's weights alone.
+
+*Does P solve the Riccati equation?* Every P(t_{k+1}) is carried one step back by DOP853 and compared with P(t_k).
+
+*Does anyone gain by deviating?* With the others' feedback frozen, each party's best response is known exactly
+(`tadcore.verification.best_responses`); at an equilibrium it saves nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.verification.oracle.flow import riccati_within
+from tadcore.verification.oracle.matrices import FeedbackSolution, Floats, matrices_of, stacked_rows
+from tadcore.verification.oracle.responses import REGRET, best_responses, is_smooth
+from tadcore.verification.report import Check, Measurement, VerificationReport
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["check_equilibrium", "riccati_defect"]
+
+_FEWEST, _MOST = 800, 6400
+_DEFECT, _TERMINAL, _FEEDBACK = 1e-10, 1e-14, 1e-12
+
+
+def riccati_defect(sc: Scenario, equilibrium: FeedbackSolution) -> dict[str, Floats]:
+    """How far P(t_k) is from P(t_{k+1}) carried back one step, by party.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game.
+    equilibrium : Equilibrium
+        P on the grid.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (K,)
+        Largest entry of the difference at every step, relative to the largest of the party's P on it; inf
+        throughout where the flow breaks down.
+    """
+    m = matrices_of(sc)
+    values = m.values(equilibrium.P)
+    found = riccati_within(m, values[:, 1:], sc.horizon / sc.steps)
+    if found is None:
+        return {party: np.full(sc.steps, np.inf) for party in m.parties}
+    off = np.abs(found[1] - values[:, :-1]).max(axis=(2, 3))
+    scale = np.maximum(np.abs(values[:, :-1]).max(axis=(2, 3)), np.abs(values[:, 1:]).max(axis=(2, 3)))
+    relative = np.divide(off, scale, out=np.where(off > 0, np.inf, 0.0), where=scale > 0)
+    return dict(zip(m.parties, relative, strict=True))
+
+
+def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None) -> VerificationReport:
+    """Check that a Riccati solution solves its equations and that its feedback is a Nash equilibrium.
+
+    Parameters
+    ----------
+    sc : Scenario
+        The game and its initial state.
+    equilibrium : Equilibrium, optional
+        What to check; `tadcore.solve_equilibrium` of the scenario by default.
+
+    Returns
+    -------
+    VerificationReport
+        Riccati defect and terminal value, feedback rows, and the regret of each party relative to what it pays.
+    """
+    eq = solve_equilibrium(sc) if equilibrium is None else equilibrium
+    m = matrices_of(sc)
+    values = m.values(eq.P)
+    rows = stacked_rows(eq.feedback, sc.players)
+    theorem = "thm:fbne" if sc.interaction == "I1" else "thm:zero:sum:game"
+    riccati, law = ("eq:Riccati", "eq:1d") if sc.interaction == "I1" else ("eq:RDE", "eq:zero_sum_control1, 2")
+    checks = []
+    for party, defect in riccati_defect(sc, eq).items():
+        k = int(np.argmax(defect))
+        remedy = "P does not solve its equation there: solve the equilibrium again, and report this scenario"
+        where = f"t = {float(eq.times[k]):.6g}"
+        value = float(defect[k])
+        checks.append(Check(f"fne.riccati.{party}", value, _DEFECT, value < np.inf, remedy, riccati, where))
+    terminal = float(np.abs(values[:, -1] - m.F).max() / np.abs(m.F).max())
+    remedy = "P(T) must be the terminal weights"
+    checks.append(Check("fne.terminal", terminal, _TERMINAL, True, remedy, f"{theorem}, P(T) = F"))
+    off = np.abs(rows - m.rows(values)).max(axis=(1, 2))
+    own = float(off.max() / max(np.abs(rows).max(), 1e-300))
+    remedy = "the feedback must be that of P, u = -R⁻¹BᵀPz"
+    checks.append(Check("fne.feedback", own, _FEEDBACK, True, remedy, law, f"t = {eq.times[int(off.argmax())]:.6g}"))
+    measured = []
+    fine = sc
+    while equilibrium is None and (fine.steps < _FEWEST or (fine.steps < _MOST and not is_smooth(fine, rows))):
+        # the same equilibrium at more instants, to play between them
+        fine = sc.replace(step=sc.horizon / (sc.steps * -(-max(2 * fine.steps, _FEWEST) // sc.steps)))
+        rows = stacked_rows(solve_equilibrium(fine).feedback, sc.players)
+    for found in best_responses(fine, rows):
+        remedy = f"{found.party} gain by deviating: this feedback is no equilibrium of this game"
+        name, where = f"fne.regret.{found.party}", f"J = {found.cost:.6g}"
+        checks.append(Check(name, abs(found.relative), REGRET, found.converged, remedy, theorem, where))
+        measured.append(
+            Measurement(f"fne.J.{found.party}", found.cost, "cost of the equilibrium from this start, to T")
+        )
+    return VerificationReport(f"equilibrium of {sc!r}", tuple(checks), tuple(measured))

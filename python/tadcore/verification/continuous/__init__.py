@@ -1,0 +1,1 @@
+"""The game in continuous time: by its event times, with sliding modes."""
