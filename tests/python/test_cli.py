@@ -101,7 +101,7 @@ def test_a_game_without_equilibrium_leaves_with_1(tadcore, monkeypatch):
     def escape(sc):
         raise NoEquilibriumError(0.119, sc.horizon, sc.step)
 
-    module = pytest.importorskip("tadcore.simulation")
+    module = pytest.importorskip("tadcore.simulation.run")
     monkeypatch.setattr(module, "simulate", escape)
     code, out, err = tadcore("simulate", "paper-i1")
     assert (code, out) == (1, "")

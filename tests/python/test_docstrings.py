@@ -8,7 +8,14 @@ import pytest
 pytest.importorskip("tadcore._core")
 
 MODULES = ["", ".scenario.model", ".scenarios", ".game.equilibrium", ".game.network", ".game.synthesis"]
-MODULES += [".simulation.run", ".simulation.batch", ".sampling.shapes", ".study.study", ".analysis.sweeps", ".analysis.maps"]
+MODULES += [
+    ".simulation.run",
+    ".simulation.batch",
+    ".sampling.shapes",
+    ".study.study",
+    ".analysis.sweeps",
+    ".analysis.maps",
+]
 MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
 MODULES += [".verification", ".verification.continuous.events"]
 

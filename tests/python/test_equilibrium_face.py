@@ -120,12 +120,12 @@ def test_a_game_without_equilibrium_says_for_how_long_it_has_one(r, q_d, q_targe
 
 
 def test_runs_with_the_same_weights_share_one_game():
-    from tadcore.game import compiled as _game
+    from tadcore.game.compiled import game_of
 
     sc = tadcore.scenarios.load("paper-i1")
-    assert _game.game_of(sc) is _game.game_of(tadcore.scenarios.load("paper-i1-full"))
-    assert _game.game_of(sc) is _game.game_of(sc.replace({"attacker.position": (5, 5), "attacker.capture_radius": 1}))
-    assert _game.game_of(sc) is not _game.game_of(tadcore.scenarios.load("paper-i1-suicidal"))
-    assert _game.game_of(sc) is not _game.game_of(sc.replace(step=0.01))
-    assert _game.game_of(sc) is not _game.game_of(sc.replace(horizon=3.0))
-    assert _game.game_of(sc) is not _game.game_of(sc.replace(synthesis_weights=(1, 0, 0, 0)))
+    assert game_of(sc) is game_of(tadcore.scenarios.load("paper-i1-full"))
+    assert game_of(sc) is game_of(sc.replace({"attacker.position": (5, 5), "attacker.capture_radius": 1}))
+    assert game_of(sc) is not game_of(tadcore.scenarios.load("paper-i1-suicidal"))
+    assert game_of(sc) is not game_of(sc.replace(step=0.01))
+    assert game_of(sc) is not game_of(sc.replace(horizon=3.0))
+    assert game_of(sc) is not game_of(sc.replace(synthesis_weights=(1, 0, 0, 0)))

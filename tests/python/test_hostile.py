@@ -57,8 +57,8 @@ def test_nothing_that_is_read_back_is_unpickled(store, tmp_path):
     assert not sprung.exists()
     # The one module that names pickle asks whether a user's own callable can travel; it reads nothing back.
     named = {p.name for p in SOURCES.rglob("*.py") if "pickle." in p.read_text(encoding="utf-8")}
-    assert named == {"_schedule.py"}
-    text = (SOURCES / "_schedule.py").read_text(encoding="utf-8")
+    assert named == {"workers.py"}
+    text = (SOURCES / "study" / "workers.py").read_text(encoding="utf-8")
     assert "pickle.load" not in text
 
 

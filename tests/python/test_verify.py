@@ -180,7 +180,7 @@ def test_a_stiff_step_is_cut_and_one_too_long_is_not_converged(monkeypatch):
     sc = tadcore.scenarios.load("paper-i1").replace(step=1.0)
     report = v.check_nafne(tadcore.simulate(sc), deviations=1)
     assert report.ok, report
-    monkeypatch.setattr(v.adapted, "_PIECES", 1)
+    monkeypatch.setattr(v.oracle.adapted, "_PIECES", 1)
     report = v.check_nafne(tadcore.simulate(sc), deviations=1)
     assert not report.converged
     with pytest.raises(tadcore.VerificationError):
@@ -203,12 +203,12 @@ def test_inconsistent_gains_are_found(run):
 
 
 def test_a_synthesis_that_misses_zero_is_found(run, monkeypatch):
-    real = v.consistency.synthesize
+    real = v.checks.consistency.synthesize
 
     def worse(sc, **options):
         return dataclasses.replace(real(sc, **options), theta=1e-9)
 
-    monkeypatch.setattr(v.consistency, "synthesize", worse)
+    monkeypatch.setattr(v.checks.consistency, "synthesize", worse)
     report = v.check_consistency(run, tadcore.solve_equilibrium(run.scenario))
     assert not report["consistency.theta"].accepted
 

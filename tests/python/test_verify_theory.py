@@ -88,7 +88,7 @@ def test_the_curvature_of_a_large_team_is_found_without_forming_the_hessian(monk
     objective = FullObjective(sc, m, m.values(tadcore.solve_equilibrium(sc).P)[:, 2], np.ones((4, 4), dtype=bool))
     x = np.random.default_rng(0).normal(size=objective.unknowns)
     dense = v.lowest_curvature(objective, x)
-    monkeypatch.setattr(v.gains, "_DENSE", 1)
+    monkeypatch.setattr(v.checks.gains, "_DENSE", 1)
     assert v.lowest_curvature(objective, x) == pytest.approx(dense, rel=1e-8)
 
 

@@ -156,7 +156,7 @@ def test_how_many_games_change_under_refinement():
 
 def full_sight(sc):
     """A game with full sight by SciPy: P, then z with an event for each capture circle; the end and z there."""
-    m = v._matrices.matrices_of(sc)
+    m = v.oracle.matrices.matrices_of(sc)
     N = m.size
     options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
     back = solve_ivp(
@@ -353,13 +353,13 @@ def test_plain_gradients_get_there_too_and_a_bound_on_rounds_is_reported():
 def test_a_player_is_told_nothing_of_the_others_sight(monkeypatch):
     """Each player's objective is built from a network in which it alone sees."""
     told = []
-    real = v.decentral.FullObjective
+    real = v.checks.decentral.FullObjective
 
     def listening(sc, m, values, adjacency, dim=None):
         told.append(adjacency.copy())
         return real(sc, m, values, adjacency, dim)
 
-    monkeypatch.setattr(v.decentral, "FullObjective", listening)
+    monkeypatch.setattr(v.checks.decentral, "FullObjective", listening)
     run = play("paper-i1")
     v.decentralise(run.scenario, step=0, adjacency=run.adjacency[0], max_rounds=1)
     for i, seen in enumerate(told[:3]):
@@ -370,8 +370,8 @@ def test_a_player_is_told_nothing_of_the_others_sight(monkeypatch):
 def test_a_protocol_that_stops_early_is_found(monkeypatch):
     run = play("paper-i1")
     assert v.check_decentral(run).ok
-    real = v.decentral.decentralise
-    monkeypatch.setattr(v.decentral, "decentralise", lambda *a, **o: real(*a, max_rounds=3, **o))
+    real = v.checks.decentral.decentralise
+    monkeypatch.setattr(v.checks.decentral, "decentralise", lambda *a, **o: real(*a, max_rounds=3, **o))
     report = v.check_decentral(run)
     assert not report.accepted
     assert not report.converged

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tadcore
-from tadcore.game import compiled as _game
+from tadcore.game.compiled import game_of
 from tadcore.sampling.shapes import Box
 
 PLACES = {"attacker.position": Box([-3.0, -3.0], [3.0, 3.0])}
@@ -18,19 +18,19 @@ def test_a_second_study_starts_warm_and_ends_alike(tmp_path):
     sc = tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": 0.0125})
     study = tadcore.Study(sc, vary=PLACES, trials=300, seed=3)
     first = study.run(table=kept)
-    solved = _game.game_of(sc).table()
+    solved = game_of(sc).table()
     assert solved["misses"] == solved["entries"] > 100
-    assert kept.read_bytes() == _game.game_of(sc).save_table()
+    assert kept.read_bytes() == game_of(sc).save_table()
 
     # The bytes of one game in a new one: as a process of its own would read them.
     code = (
         "import sys, numpy as np, tadcore\n"
-        "from tadcore import _game\n"
+        "from tadcore.game.compiled import game_of\n"
         "from tadcore.sampling import Box\n"
         "sc = tadcore.scenarios.load('paper-i1').replace({'horizon': 1.0, 'step': 0.0125})\n"
         "study = tadcore.Study(sc, vary={'attacker.position': Box([-3.0, -3.0], [3.0, 3.0])}, trials=300, seed=3)\n"
         "result = study.run(table=sys.argv[1])\n"
-        "np.savez(sys.argv[2], kind=result.kind, time=result.time, misses=_game.game_of(sc).table()['misses'])\n"
+        "np.savez(sys.argv[2], kind=result.kind, time=result.time, misses=game_of(sc).table()['misses'])\n"
     )
     subprocess.run([sys.executable, "-c", code, str(kept), str(tmp_path / "second.npz")], check=True)
     second = np.load(tmp_path / "second.npz")

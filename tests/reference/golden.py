@@ -49,7 +49,8 @@ def game(interaction, weights, axes, horizon, step, sight):
             "horizon": horizon,
             "step": step,
             "attacker": {"position": [0.0] * axes, "control_weight": attacker, "capture_radius": 0.15},
-            "target": {"position": [1.0] * axes, "control_weight": target} | ({} if first else {"visibility_radius": 2.0}),
+            "target": {"position": [1.0] * axes, "control_weight": target}
+            | ({} if first else {"visibility_radius": 2.0}),
             "defenders": [
                 {"position": [2.0 + i] * axes, "control_weight": r, "capture_radius": 0.2, "visibility_radius": sight}
                 for i, r in enumerate(team)
@@ -103,7 +104,8 @@ def gains():
         networks = uniform(key, (many, m, size)) < 0.6
         instants = (uniform(key + 100, (many,)) * steps).astype(int)
         solved = [
-            tadcore.synthesize(sc, step=int(k), adjacency=network) for k, network in zip(instants, networks, strict=True)
+            tadcore.synthesize(sc, step=int(k), adjacency=network)
+            for k, network in zip(instants, networks, strict=True)
         ]
         found[name] = {
             "digest": digest(*(g.rows for g in solved), [g.theta for g in solved], [g.certified for g in solved]),
