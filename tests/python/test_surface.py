@@ -38,7 +38,7 @@ def test_everything_exported_is_there_and_documented():
 
 
 def test_an_unknown_name_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+    with pytest.raises(AttributeError, match=r"No tadcore attribute simulat$"):
         tadcore.simulat  # noqa: B018
 
 

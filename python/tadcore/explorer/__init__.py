@@ -4,8 +4,6 @@ Started by ``tadcore explore``. It needs Bokeh (the extra ``explore``). A game i
 is shown in projection along one of its axes.
 """
 
-from .model import Explorer
-from .page import Page
-from .server import serve
+import lazy_loader
 
-__all__ = ["Explorer", "Page", "serve"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,8 +1,8 @@
 """The paper's section VI, computed, compared and drawn.
 
-Eight runs are bundled as scenarios. Each is played, its outcome, its time and the instants at which its network changes
-are set beside the printed ones (`tadcore.reproduce.published`), statements that the text makes about the runs are checked, and
-every figure of the section is drawn. Nothing computed is stored: every number in the report comes from a run made now.
+Eight runs are bundled as scenarios. Each is played; its outcome, its time and the instants at which its network changes
+are set beside the printed ones (`tadcore.reproduce.published`), statements that the text makes about the runs are
+checked, and every figure of the section is drawn. Nothing computed is stored: every number comes from a run made now.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The checks of Theorems thm1 and thm2 on a run; `tadcore.verification.oracle.adapted` has the statements themselves."""
+"""The checks of Theorems thm1 and thm2 on a run; `tadcore.verification.oracle.adapted` has the statements."""
 
 from __future__ import annotations
 

@@ -28,6 +28,7 @@ class Loops:
         self.kept: dict[tuple[int, bytes], Floats] = {}
 
     def __call__(self, k: int, network: NDArray[np.bool_]) -> Floats:
+        """C at an instant under a network, computed once."""
         key = (k, network.tobytes())
         if key not in self.kept:
             rows = 0.5 * (self.rows[k] + self.rows[k + 1])
