@@ -28,8 +28,7 @@ from .scenario.model import Attacker, Defender, Scenario, Target
 from .simulation.batch import Batch, simulate_batch
 from .simulation.run import Run, simulate
 from .statistics import HalfWidth
-from .study.result import StudyResult, load_study
-from .study.study import Study
+from .study.study import Study, StudyResult, load_study
 from .verification import VerificationReport, verify
 
 __all__ = [

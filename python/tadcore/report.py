@@ -15,7 +15,7 @@ import numpy as np
 from . import statistics
 from ._shared.files import write_whole
 from .errors import ScenarioError
-from .simulation.files import provenance
+from .scenario.provenance import provenance
 from .statistics import TrialOutcomes
 from .statistics.outcomes import Floats, indicators
 

@@ -208,12 +208,12 @@ def test_an_entry_of_a_manifest_is_not_taken_for_what_it_is_not(tmp_path, change
 
 @pytest.mark.parametrize("path", ["defenders.7.position", "defenders[7].visibility_radius", "defenders.3.position.x"])
 def test_a_defender_that_is_not_there_is_answered_with_those_that_are(path):
-    with pytest.raises(ScenarioError, match=r"of this game, which has 3 defenders, numbered from 0 to 2$"):
+    with pytest.raises(ScenarioError, match=r"of this game, which has 3 defenders, d1 to d3$"):
         tadcore.Study(calm(), {path: Box(0, 1)}, trials=1)
-    with pytest.raises(ScenarioError, match=r"the list holds 3, numbered from 0$"):
+    with pytest.raises(ScenarioError, match=r"which has 3 defenders, d1 to d3$"):
         calm().replace({"defenders[7].capture_radius": 0.2})
     alone = Scenario.from_toml_string("[[defenders]]".join(TEXT.split("[[defenders]]")[:2]))
-    with pytest.raises(ScenarioError, match=r"which has 1 defender, number 0$"):
+    with pytest.raises(ScenarioError, match=r"which has 1 defender, d1$"):
         tadcore.Study(alone, {"defenders.1.capture_radius": Box(0.1, 1)}, trials=1)
 
 

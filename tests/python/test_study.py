@@ -197,9 +197,9 @@ def test_results_are_frames(tmp_path):
         ("synthesis_weights", r"tadcore\.sweep"),
         ("interaction", r"tadcore\.sweep"),
         ("atacker.position", r"did you mean attacker\.position\?"),
-        ("defenders.0.visibility", r"did you mean defenders\.0\.visibility_radius\?"),
-        ("defender.*.position", r"did you mean defenders\.\*\.position\?"),
-        ("defenders.3.position", r"of this game, which has 3 defenders, numbered from 0 to 2"),
+        ("defenders.0.visibility", r"did you mean d1\.visibility_radius\?"),
+        ("defender.*.position", r"did you mean d\*\.position\?"),
+        ("defenders.3.position", r"of this game, which has 3 defenders, d1 to d3"),
         ("attacker.visibility_radius", "the path of a position or a radius"),
         ("target.capture_radius", "the path of a position or a radius"),
         ("attacker.position.z", "the path of a position or a radius"),
@@ -207,7 +207,7 @@ def test_results_are_frames(tmp_path):
         ("attacker.*", "the path of a position or a radius"),
         ("*", "the path of a position or a radius"),
         ("", "the path of a position or a radius"),
-        (3, "keyed by paths"),
+        (3, "a path such as attacker"),
     ],
 )
 def test_paths_that_cannot_vary_are_refused_with_the_way_to_do_it(path, words):

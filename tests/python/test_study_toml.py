@@ -86,7 +86,7 @@ def test_a_scenario_is_a_name_or_a_table(written):
         ("trials = 300", "trials =", "line 3"),
         ("seed = 5", "seed = -1", "seed: got -1"),
         ('"sobol"', '"halton"', "design: got 'halton'"),
-        ("calm.toml", "clam.toml", "scenario: got 'clam.toml', must be a bundled"),
+        ("calm.toml", "clam.toml", "scenario: got 'clam.toml', must be a file, or the name of a bundled scenario"),
         ("calm.toml", "paper-1", r"did you mean paper-i1\?"),
         ('"calm.toml"', "3", "scenario: got 3"),
         ("{ box =", "{ bax =", r"\.bax: .* must be one of the samplers"),

@@ -93,11 +93,11 @@ def test_a_store_holds_every_cell_and_grows_with_the_grid(tmp_path, monkeypatch)
         ({"step": [0.05, 0.3]}, "step: got 0.3, must be a divisor"),
         ({"horizons": [1.0]}, "horizons"),
         ({"attacker.weight": [1.0]}, "attacker.weight"),
-        ({"defenders.3.control_weight": [1.0]}, "path of a field that exists"),
+        ({"defenders.3.control_weight": [1.0]}, "which has 3 defenders, d1 to d3"),
         ({"attacker.position": [(0, 0)]}, "a field that the study does not vary"),
         ({"*.visibility_radius": [1.0]}, "a field that the study does not vary"),
         ({"defenders.*.control_weight": [1.0], "defenders.0.control_weight": [2.0]}, "swept once only"),
-        ({3: [1.0]}, "keyed by paths"),
+        ({3: [1.0]}, "a path such as attacker"),
     ],
 )
 def test_a_grid_that_cannot_be_swept_is_refused_before_any_cell_runs(grid, words, monkeypatch):

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore.errors import ScenarioError
-from tadcore.scenario.fields import FARTHEST
+
+from .limits import COORDINATE, FINITE
 
 _LISTED = 20
 
@@ -48,8 +49,8 @@ def as_positions(values: ArrayLike, shape: tuple[int, ...], *, rows: bool = Fals
     array = as_real("positions", values, rule)
     if array.shape[rows:] != shape or array.ndim != len(shape) + rows:
         raise ScenarioError("positions", f"shape {array.shape}", rule)
-    refuse_where("positions", array, ~np.isfinite(array), "a finite number")
-    refuse_where("positions", array, np.abs(array) > FARTHEST, "a coordinate between -1e100 and 1e100")
+    for must in (FINITE, COORDINATE):
+        refuse_where("positions", array, ~must.holds(array), must.words)
     return array
 
 

@@ -1,8 +1,9 @@
-"""Tables as plain text, for ``repr``."""
+"""Text for people: tables for ``repr``, and what somebody may have meant."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 
 
 def as_text(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -15,3 +16,9 @@ def as_text(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> s
         for row in table
     ]
     return "\n".join([title, *(line.rstrip() for line in lines)])
+
+
+def similar(word: object, known: Iterable[str], *, most: int = 1, cutoff: float = 0.6) -> str:
+    """``did you mean d1?`` where something known is near the word; empty where nothing is."""
+    close = difflib.get_close_matches(str(word), list(known), n=most, cutoff=cutoff)
+    return f"did you mean {' or '.join(close)}?" if close else ""

@@ -148,7 +148,7 @@ def outcome_map(
     """
     import xarray as xr
 
-    from tadcore.simulation.files import provenance
+    from tadcore.scenario.provenance import provenance
 
     if player not in sc.players:
         raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import as_positions, as_real, refuse_where
+from tadcore._shared.limits import OF_FIELD
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.starts import Rows, rows_of
-from tadcore.study.vary import component
 
 if TYPE_CHECKING:
     from tadcore.statistics import TrialOutcomes
@@ -44,18 +45,15 @@ class Replays:
         labels = sc.constrained if kind == "visibility" else (*sc.players[: sc.n], "attacker")
         if player not in labels:
             raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
-        owner = f"defenders.{int(player[1:]) - 1}" if player.startswith("d") else player
-        self.column = component(sc, f"{owner}.{kind}_radius").row
+        self.column = component(sc, f"{player}.{kind}_radius").row
         self.sc, self.rows, self.kind, self.threads = sc, rows, kind, threads
         self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
 
     def checked(self, field: str, radii: ArrayLike) -> Floats:
         """Radii that every trial accepts, σ < ζ included."""
         values = as_real(field, radii, "positive numbers").reshape(np.shape(radii))
-        if self.kind == "capture":
-            refuse_where(field, values, ~((values > 0.0) & np.isfinite(values)), "a positive finite number")
-        else:
-            refuse_where(field, values, ~(values > 0.0), "a positive number, or inf")
+        for rule in OF_FIELD[f"{self.kind}_radius"]:
+            refuse_where(field, values, ~rule.holds(values), rule.words)
         if self.column < self.sc.n:
             if self.kind == "visibility":
                 least = float(self.rows.capture_radii[..., self.column].max())

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import as_index
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
+from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import simulate_batch
 from tadcore.simulation.starts import rows_of
 from tadcore.statistics.outcomes import as_level, indicators, outcome_names
-from tadcore.study.vary import component
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,18 +20,14 @@ import numpy as np
 
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import OutcomeKind
-from tadcore.study.vary import expand, game_fields, indexed, normal
+from tadcore.scenario.paths import expand, normal
 
 if TYPE_CHECKING:
     import xarray
 
-    from tadcore.scenario.model import Scenario
-    from tadcore.study.result import StudyResult
-    from tadcore.study.study import StoppingRule, Study
+    from tadcore.study.study import StoppingRule, Study, StudyResult
 
 __all__ = ["Cell", "SweepResult", "sweep"]
-
-_STATES = ("position", "visibility_radius", "capture_radius")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +93,7 @@ class SweepResult:
         """
         import xarray as xr
 
-        from tadcore.simulation.files import provenance
+        from tadcore.scenario.provenance import provenance
 
         kinds = sorted(OutcomeKind)
         rows = [_summary(cell.result, kinds) for cell in self.cells]
@@ -207,10 +203,10 @@ def _axes(study: Study, grid: Mapping[str, Sequence[Any]]) -> dict[str, tuple[An
     taken: dict[str, str] = {}
     varied = {quantity.owner for quantity in study.quantities}
     for path, values in grid.items():
-        name = normal(path)
+        name = normal(path, "grid")
         if isinstance(values, str | bytes) or not np.ndim(values) or not len(values):
             raise ScenarioError(f'grid["{path}"]', values, "a sequence of at least one value")
-        for one in _fields(study.scenario, name) or [name]:
+        for one in expand(name, study.scenario.paths) or [name]:
             if one in varied:
                 raise ScenarioError(f'grid["{path}"]', one, "a field that the study does not vary")
             if one in taken:
@@ -220,17 +216,12 @@ def _axes(study: Study, grid: Mapping[str, Sequence[Any]]) -> dict[str, tuple[An
     return axes
 
 
-def _fields(sc: Scenario, path: str) -> list[str]:
-    players = ["attacker", "target", *(f"defenders.{i}" for i in range(sc.n))]
-    return expand(path, [*game_fields(sc), *(f"{player}.{field}" for player in players for field in _STATES)])
-
-
 def _cell_study(study: Study, point: Mapping[str, Any]) -> Study:
     """The study of one point; an error says at which."""
     changes = {
-        indexed(field): value
+        field: value
         for path, value in point.items()
-        for field in _fields(study.scenario, path) or [path]  # a path that leads nowhere is refused by replace
+        for field in expand(path, study.scenario.paths) or [path]  # a path that leads nowhere is refused by replace
     }
     return study.replace(sc=study.scenario.replace(changes))
 

@@ -10,16 +10,16 @@ import typer
 
 from tadcore.errors import ScenarioError
 
+from .options import Changes, Source, read
 from .terminal import say
 
 __all__ = ["draw_map", "write_report"]
 
 
 def draw_map(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="A TOML file, or the name of a bundled scenario.")
-    ],
+    scenario: Source,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Figure (.png, .pdf, .svg) or data (.nc) to write.")],
+    changes: Changes = None,
     player: Annotated[
         str, typer.Option(metavar="NAME", help="Whose start: d1, d2, …, target or attacker.")
     ] = "attacker",
@@ -42,10 +42,8 @@ def draw_map(
     """
     from tadcore.analysis.maps import check_destination, outcome_map
 
-    from .app import load_scenario
-
     check_destination("--out", out)
-    sc = load_scenario(scenario)
+    sc = read(scenario, changes)
     rows = max(round((size - 1) * (y[1] - y[0]) / (x[1] - x[0])), 1) + 1 if x[1] > x[0] else size
     found = outcome_map(sc, player, x=(*x, size), y=(*y, rows), z=z, threads=threads, progress=progress)
     found.save(out, **({"quantity": "time"} if time else {}))
@@ -69,7 +67,7 @@ def write_report(
       tadcore report out --out my-study.html
     """
     from tadcore.report import report
-    from tadcore.study.result import StudyResult
+    from tadcore.study.study import StudyResult
 
     if out.is_dir():
         raise ScenarioError("--out", str(out), "a file to write, not a folder")

@@ -4,52 +4,44 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tadcore._shared.files import write_whole
 
+from .options import FAILED, Changes, Source, read
 from .terminal import complain, say
 
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["register"]
-
-_NOT_ACCEPTED = 1
+__all__ = ["verify"]
 
 
-def register(app: typer.Typer, load: Callable[[str], Scenario]) -> None:
-    """Add the command to ``app``; ``load`` makes a scenario of a file or of a bundled name."""
+def verify(
+    scenario: Source,
+    changes: Changes = None,
+    deviations: Annotated[int, typer.Option(min=0, help="Random deviations of each player.")] = 2,
+    starts: Annotated[int, typer.Option(min=0, help="Random starts of the synthesis at chosen instants.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Key of everything random.")] = 0,
+    bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
+    out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,
+) -> None:
+    """Check the paper's theorems on a scenario: equilibrium, indices, consistency, gains, geometry.
 
-    @app.command(short_help="Check the paper's theorems on a scenario.")
-    def verify(
-        file: Annotated[str, typer.Argument(metavar="FILE", help="A TOML file, or the name of a bundled scenario.")],
-        deviations: Annotated[int, typer.Option(min=0, help="Random deviations of each player.")] = 2,
-        starts: Annotated[int, typer.Option(min=0, help="Random starts of the synthesis at chosen instants.")] = 0,
-        seed: Annotated[int, typer.Option(min=0, help="Key of everything random.")] = 0,
-        bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
-        out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,
-    ) -> None:
-        """Check the paper's theorems on a scenario: equilibrium, indices, consistency, gains, geometry.
+    \b
+      tadcore verify paper-i1
+      tadcore verify my.toml --starts 5 --json report.json
 
-        \b
-          tadcore verify paper-i1
-          tadcore verify my.toml --starts 5 --json report.json
+    Every check is printed with its measured value, its bound and where in the paper it comes from. Exits with 1
+    unless all are converged and accepted.
+    """
+    from tadcore.verification import verify as check
 
-        Every check is printed with its measured value, its bound and where in the paper it comes from. Exits with 1
-        unless all are converged and accepted.
-        """
-        from tadcore.verification import verify as check
-
-        report = check(load(file), deviations=deviations, starts=starts, seed=seed, bound=bound)
-        if out is not None:
-            write_whole(out, json.dumps(report.to_dict(), indent=2) + "\n")
-        for line in report.lines():
-            say(line)
-        if not report.ok:
-            complain(f"{len(report.failures)} of {len(report)} checks do not pass")
-            raise typer.Exit(_NOT_ACCEPTED)
+    report = check(read(scenario, changes), deviations=deviations, starts=starts, seed=seed, bound=bound)
+    if out is not None:
+        write_whole(out, json.dumps(report.to_dict(), indent=2) + "\n")
+    for line in report.lines():
+        say(line)
+    if not report.ok:
+        complain(f"{len(report.failures)} of {len(report)} checks do not pass")
+        raise typer.Exit(FAILED)

@@ -6,8 +6,7 @@ once, at the outermost entry: the constructor, ``model_validate`` and its relati
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -15,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from tadcore.errors import ScenarioError
 
 from .fields import scenario_error
+from .paths import AXES, normal
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -92,7 +92,8 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
         Parameters
         ----------
         updates : mapping of str to object, optional
-            Paths and their new values, such as ``{"defenders[1].visibility_radius": 2.0}``.
+            Paths and their new values, such as ``{"d1.visibility_radius": 2.0}``, or with a wildcard
+            ``{"d*.visibility_radius": 2.0}``; `tadcore.scenario.paths` has the grammar.
         **fields
             The same, for top-level fields.
 
@@ -103,9 +104,20 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
         """
         changes = {**(updates or {}), **fields}
         data = self._plain(changes)
+        taken: dict[str, str] = {}
         for path, value in changes.items():
-            _assign(data, path, value)
+            for name in self._meant(path, value):
+                if name in taken:
+                    raise ScenarioError(path, value, f'set once only: "{taken[name]}" sets it too')
+                taken[name] = path
+                _assign(data, name, path, value)
         return type(self).model_validate(data)
+
+    def _meant(self, path: Any, value: Any) -> Sequence[str]:
+        """The fields that a path means, in normal form."""
+        if not isinstance(path, str):
+            raise ScenarioError(str(path), value, "named by a path such as attacker.position or d1.position")
+        return [normal(path)]
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """The fields to start a replacement from."""
@@ -116,37 +128,31 @@ def _translate(model: type[Any], error: ValidationError) -> ScenarioError:
     return scenario_error(error, model, model._root)
 
 
-_PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
-_PART = re.compile(r"[A-Za-z_]\w*|\d+")
+_NO_FIELD = "the path of a field that exists, such as attacker.position or d1.position"
 
 
-def _assign(data: dict[str, Any], path: str, value: Any) -> None:
-    """Set the entry of a nested table that `path` names; tuples and models on the way are opened."""
-    if not isinstance(path, str) or not _PATH.fullmatch(path):
-        raise ScenarioError(str(path), value, "named by a path such as attacker.position or defenders[0].position")
-    parts: list[str | int] = [int(part) if part.isdigit() else part for part in _PART.findall(path)]
+def _assign(data: dict[str, Any], name: str, path: str, value: Any) -> None:
+    """Set the entry of a nested table that `name` means; tuples and models on the way are opened."""
     node: Any = data
-    for part in parts[:-1]:
-        node[part] = child = _open(_look_up(node, part, path, value))
-        node = child
-    last = parts[-1]
-    if isinstance(last, int):
-        _look_up(node, last, path, value)
-    elif not isinstance(node, dict):
-        raise ScenarioError(path, value, "the path of a field that exists")
-    node[last] = value
+    *way, last = name.split(".")
+    for part in way:
+        key = _key(node, part, path, value)
+        node[key] = node = _open(node[key])
+    if isinstance(node, dict) and last.isidentifier():
+        node[last] = value  # a field that does not exist is refused by the model, which knows the others
+    else:
+        node[_key(node, last, path, value)] = value
 
 
-def _look_up(node: Any, part: str | int, path: str, value: Any) -> Any:
-    try:
-        if isinstance(part, int) == isinstance(node, list):
-            return node[part]
-    except IndexError:
-        rule = f"the path of a field that exists: the list holds {len(node)}, numbered from 0"
-        raise ScenarioError(path, value, rule) from None
-    except (KeyError, TypeError):
-        pass
-    raise ScenarioError(path, value, "the path of a field that exists")
+def _key(node: Any, part: str, path: str, value: Any) -> str | int:
+    """The key of a part of a path in a table or a list."""
+    if isinstance(node, dict) and part in node:
+        return part
+    if isinstance(node, list):
+        place = AXES.find(part) if part in ("x", "y", "z") else int(part) if part.isdecimal() and len(part) < 10 else -1
+        if 0 <= place < len(node):
+            return place
+    raise ScenarioError(path, value, _NO_FIELD)
 
 
 def _open(child: Any) -> Any:

@@ -6,8 +6,6 @@ reader sees. Nothing is coerced: a string, a bool or a decimal is never taken fo
 
 from __future__ import annotations
 
-import difflib
-import math
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, TypeAlias, get_args
 
@@ -15,6 +13,19 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from tadcore._shared.limits import (
+    COORDINATE,
+    FINITE,
+    FRACTION,
+    HEAVIEST,
+    LIGHTEST,
+    MOST_DEFENDERS,
+    POSITIVE,
+    RADIUS,
+    WEIGHT,
+    Rule,
+)
+from tadcore._shared.text import similar
 from tadcore.errors import MISSING, ScenarioError
 
 Location: TypeAlias = tuple[str | int, ...]
@@ -55,28 +66,18 @@ def as_number(value: object, rule: str) -> float:
         raise refuse(value, rule) from None
 
 
-def _kind(rule: str, holds: Callable[[float], bool]) -> Callable[[object], float]:
+def _kind(rule: Rule) -> Callable[[object], float]:
     def check(value: object) -> float:
-        number = as_number(value, rule)
-        if not holds(number):
-            raise refuse(value, rule)
+        number = as_number(value, rule.words)
+        if not rule.holds(number):
+            raise refuse(value, rule.words)
         return number
 
     return check
 
 
-LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
-"""Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
-
-MOST_DEFENDERS = 1000
-"""Far beyond what can be played; P of so many players fits into memory on the shortest grids only."""
-
-is_positive = _kind("a positive finite number", lambda v: v > 0.0 and math.isfinite(v))
-_is_bounded_weight = _kind("a weight between 1e-30 and 1e30", lambda v: LIGHTEST <= v <= HEAVIEST)
-_is_near = _kind("a coordinate between -1e100 and 1e100", lambda v: abs(v) <= FARTHEST)
-is_radius = _kind("a positive number, or inf for unlimited sight", lambda v: v > 0.0)
-is_fraction = _kind("a number in [0, 1]", lambda v: 0.0 <= v <= 1.0)
-_is_finite = _kind("a finite number", math.isfinite)
+is_positive, is_radius, is_fraction = _kind(POSITIVE), _kind(RADIUS), _kind(FRACTION)
+_is_bounded_weight, _is_near, _is_finite = _kind(WEIGHT), _kind(COORDINATE), _kind(FINITE)
 
 
 def is_weight(value: object) -> float:
@@ -185,8 +186,7 @@ _HINTS = 100  # unknown fields for which a known one is looked up; a file may ho
 def _unknown(owner: type[BaseModel] | None, name: str, hint: bool) -> str:
     if owner is None or not hint:
         return "left out: there is no such field"
-    close = difflib.get_close_matches(name, owner.model_fields, n=1)
-    known = f"did you mean {close[0]}?" if close else f"the fields are {', '.join(owner.model_fields)}"
+    known = similar(name, owner.model_fields) or f"the fields are {', '.join(owner.model_fields)}"
     return f"left out: there is no such field; {known}"
 
 

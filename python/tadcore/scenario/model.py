@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -33,10 +33,11 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tadcore._shared.files import parse_toml, read_text, write_whole
+from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
+from tadcore.errors import ScenarioError
 
 from .checked import CheckedModel
 from .fields import (
-    MOST_DEFENDERS,
     Fraction,
     Gamma,
     Position,
@@ -47,6 +48,7 @@ from .fields import (
     is_team,
     refusal,
 )
+from .paths import beyond, expand
 
 __all__ = ["Attacker", "Defender", "Scenario", "Target"]
 
@@ -120,7 +122,7 @@ class Scenario(CheckedModel):
     >>> sc = tadcore.scenarios.load("paper-i1")
     >>> sc.n, sc.dim, sc.steps
     (3, 2, 1200)
-    >>> sc.replace({"defenders[1].visibility_radius": 4.0}).visibility_radii
+    >>> sc.replace({"d2.visibility_radius": 4.0}).visibility_radii
     array([5.  , 4.  , 1.25])
     """
 
@@ -171,7 +173,7 @@ class Scenario(CheckedModel):
                 rule = f"a list of {self.dim} numbers, as attacker.position is"
                 problems.append(((*where, "position"), part.position, rule))
         for i, d in enumerate(self.defenders):
-            if d.capture_radius >= d.visibility_radius:
+            if not sees_whom_it_intercepts(d.capture_radius, d.visibility_radius):
                 rule = f"larger than the capture radius ({d.capture_radius!r})"
                 problems.append((("defenders", i, "visibility_radius"), d.visibility_radius, rule))
         return problems
@@ -204,6 +206,17 @@ class Scenario(CheckedModel):
     def constrained(self) -> tuple[str, ...]:
         """Labels of the m players with limited sight: the defenders, and in I2 the target."""
         return self.players[: self.n + (self.interaction == "I2")]
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Every field that the game has, as `replace` and `sweep` name it: `tadcore.scenario.paths` in normal form."""
+        own = [name for name in type(self).model_fields if name not in ("attacker", "target", "defenders")]
+        for where, part in self._parts():
+            belonging = (
+                name for name in type(part).model_fields if part._belongs.get(name) in (None, self.interaction)
+            )
+            own += [".".join(map(str, (*where, name))) for name in belonging]
+        return tuple(own)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -271,6 +284,16 @@ class Scenario(CheckedModel):
         data: dict[str, Any] = handler(self)
         _prune(data, self.interaction)
         return data
+
+    def _meant(self, path: Any, value: Any) -> Sequence[str]:
+        names = super()._meant(path, value)
+        if "*" in names[0]:
+            names = expand(path, self.paths)
+        if missing := beyond(self.n, path):
+            raise ScenarioError(path, value, missing)
+        if not names:
+            raise ScenarioError(path, value, "the path of a field that some player of this game has")
+        return names
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         data = self.model_dump()

@@ -9,16 +9,17 @@ array([5.  , 2.25, 1.25])
 
 from __future__ import annotations
 
-import difflib
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tadcore.errors import ScenarioError
+from tadcore._shared.text import similar
+from tadcore.errors import MISSING, ScenarioError
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
 
-__all__ = ["load", "names", "summary", "text"]
+__all__ = ["find", "load", "names", "summary", "text"]
 
 _NAMES = (
     "paper-i1",
@@ -44,11 +45,44 @@ def load(name: str) -> Scenario:
     return Scenario.from_toml_string(text(name), name=f"{name}.toml")
 
 
+def find(source: str, folder: Path | None = None, *, field: str = "") -> Scenario:
+    """A scenario by its file, or else the bundled one of that name.
+
+    Parameters
+    ----------
+    source : str
+        A path, or a name from `names`.
+    folder : path, optional
+        What a relative path is relative to; the working folder by default.
+    field : str, optional
+        What errors call it; the source itself by default.
+
+    Raises
+    ------
+    ScenarioError
+        There is neither, or the file holds no scenario.
+    """
+    from tadcore.scenario.model import Scenario
+
+    path = (folder or Path()) / source
+    if "\0" not in source and not path.exists():
+        if source in _NAMES:
+            return load(source)
+        hint = similar(source, _NAMES, cutoff=0.5)
+        rule = f"a file, or the name of a bundled scenario{hint and f'; {hint}'}"
+        raise ScenarioError(field or source, MISSING if not field else source, rule)
+    try:
+        return Scenario.from_toml(path)
+    except ScenarioError as error:
+        if not error.field.startswith(str(path)):
+            error.add_note(f"(in {source})")
+        raise
+
+
 def text(name: str) -> str:
     """The TOML file of a bundled scenario, comments included."""
     if name not in _NAMES:
-        close = difflib.get_close_matches(str(name), _NAMES, n=2, cutoff=0.5)
-        hint = f"did you mean {' or '.join(close)}?" if close else f"the names are {', '.join(_NAMES)}"
+        hint = similar(name, _NAMES, most=2, cutoff=0.5) or f"the names are {', '.join(_NAMES)}"
         raise ScenarioError("scenario name", name, f"the name of a bundled scenario; {hint}")
     return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
 

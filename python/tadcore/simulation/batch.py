@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_index, as_positions, as_real, refuse_where
-from tadcore.errors import ScenarioError
+from tadcore._shared.arrays import as_index, as_positions
 from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, OutcomeKind
+
+from .rules import capture_rows, compare, visibility_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -111,47 +112,9 @@ def simulate_batch(
     """
     as_scenario(sc)
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
-    sight = _visibility(sc, visibility_radii, len(starts))
-    capture = _capture(sc, capture_radii, len(starts))
-    _compare(capture, sight, sc.n)
+    sight = visibility_rows(sc, visibility_radii, len(starts))
+    capture = capture_rows(sc, capture_radii, len(starts))
+    compare(capture, sight, sc.n)
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
     kind, defender, time = game_of(sc).simulate_batch(starts, sight, capture, threads=workers)
     return Batch(kind, defender, time)
-
-
-def _visibility(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
-    m = len(sc.constrained)
-    shared = f"the radii of {', '.join(sc.constrained)}"
-    given = as_real("visibility_radii", sc.visibility_radii if values is None else values, f"numbers: {shared}")
-    if sc.interaction == "I1" and given.ndim in (1, 2) and given.shape[-1] == m + 1:
-        target = given[..., m:]
-        if not (np.isposinf(target)).all():
-            rule = f"{m} columns, or inf in the target's: in I1 the target sees everything"
-            raise ScenarioError("visibility_radii", f"shape {given.shape}", rule)
-        given = given[..., :m]
-    return _rows("visibility_radii", given, games, m, shared, finite=False)
-
-
-def _capture(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
-    shared = f"the radii of {', '.join(sc.players[: sc.n])}, attacker"
-    given = as_real("capture_radii", sc.capture_radii if values is None else values, f"numbers: {shared}")
-    return _rows("capture_radii", given, games, sc.n + 1, shared, finite=True)
-
-
-def _rows(
-    name: str, given: NDArray[np.float64], games: int, columns: int, meaning: str, *, finite: bool
-) -> NDArray[np.float64]:
-    """One row of positive radii for each game, or a single one for all."""
-    if given.shape not in ((columns,), (games, columns)):
-        rule = f"of shape ({columns},) or ({games}, {columns}): {meaning}"
-        raise ScenarioError(name, f"shape {given.shape}", rule)
-    good = (given > 0.0) & (np.isfinite(given) if finite else ~np.isnan(given))
-    refuse_where(name, given, ~good, "a positive finite number" if finite else "a positive number, or inf")
-    return np.ascontiguousarray(np.atleast_2d(given))
-
-
-def _compare(capture: NDArray[np.float64], sight: NDArray[np.float64], n: int) -> None:
-    """Whoever intercepts sees the attacker: σ < ζ for every defender."""
-    bad = capture[:, :n] >= sight[:, :n]
-    shown = np.broadcast_to(sight[:, :n], bad.shape)
-    refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from pathlib import Path
@@ -11,27 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from tadcore import _core
 from tadcore._shared.files import write_whole
 from tadcore.game.synthesis import theta_terms
+from tadcore.scenario.provenance import provenance
 
 if TYPE_CHECKING:
     from tadcore.game.network import Edge
-    from tadcore.scenario.model import Scenario
 
     from .run import Run
 
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
-
-
-def provenance(sc: Scenario) -> dict[str, str]:
-    """What every file carries: who wrote it, and from which scenario."""
-    text = sc.to_toml()
-    return {
-        "tadcore_version": _core.__version__,
-        "scenario_sha256": hashlib.sha256(text.encode()).hexdigest(),
-        "scenario": text,
-    }
 
 
 def dataset_of(run: Run) -> xr.Dataset:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore.errors import ScenarioError
-from tadcore.study.vary import component, setups
+from tadcore.scenario.quantities import component, setups
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario

@@ -21,7 +21,7 @@ from .store import Store
 from .table import table_of
 from .workers import LostWorkerError, computed
 
-__all__ = ["StoppingRule", "collect", "jobs_of"]
+__all__ = ["Collection", "StoppingRule", "jobs_of"]
 
 
 @runtime_checkable
@@ -33,71 +33,79 @@ class StoppingRule(Protocol):
         ...
 
 
-def collect(
-    plan: Plan,
-    trials: int,
-    store: Store | None,
-    bar: Progress,
-    schema: pa.Schema,
-    executor: Executor | None,
-    threads: int | None,
-    until: StoppingRule | None,
-) -> pa.Table:
-    """Every chunk from the store or computed, in order, up to where the rule holds."""
-    jobs = jobs_of(trials)
-    gathered = _Gathered(until)
-    left = []
-    for chunk, rows in jobs:
-        if store is not None and store.rows.get(chunk, 0) >= rows:
-            bar.add(gathered.add(chunk, store.read(chunk).slice(0, rows)), stored=True)
-        else:
-            left.append((chunk, rows))
-    if store is not None:
-        store.stop(gathered.stopped)
-    if gathered.stopped is None and left:
-        try:
-            with contextlib.closing(computed(plan, left, executor, threads)) as results:
-                for chunk, outcomes in results:
-                    table = table_of(chunk, outcomes, schema)
-                    if store is not None:
-                        store.write(chunk, table)
-                    bar.add(gathered.add(chunk, table))
-                    if gathered.stopped is not None:
-                        break
-        except LostWorkerError as error:
-            place = None if store is None else str(store.folder)
-            raise WorkerError(str(error), len(gathered.tables), len(jobs), place) from error.__cause__
-    if store is not None:
-        store.stop(gathered.stopped)
-    return gathered.table()
+class Collection:
+    """Every chunk of a study, from the store or computed, in their order, up to where a rule holds.
 
+    Parameters
+    ----------
+    plan : Plan
+        What the chunks are computed from.
+    trials : int
+        How many there are to be.
+    schema : pyarrow.Schema
+        The columns of the table.
+    store : Store or None
+        Where finished chunks are read and kept.
+    bar : Progress
+        What is told of every chunk.
+    until : StoppingRule or None
+        Asked after every chunk before which none is missing.
+    """
 
-class _Gathered:
-    """Chunks as they come, looked at in their order."""
-
-    def __init__(self, until: StoppingRule | None) -> None:
-        self.tables: dict[int, pa.Table] = {}
-        self.stopped: int | None = None
-        self._until = until
+    def __init__(
+        self, plan: Plan, trials: int, schema: pa.Schema, store: Store | None, bar: Progress, until: StoppingRule | None
+    ) -> None:
+        self._plan, self._schema, self._store, self._bar, self._until = plan, schema, store, bar, until
+        self._jobs = jobs_of(trials)
+        self._tables: dict[int, pa.Table] = {}
+        self._stopped: int | None = None
         self._looked = 0
         self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
 
-    def add(self, chunk: int, table: pa.Table) -> NDArray[np.int64]:
-        """Keep a chunk and return its counts; ask the rule after every chunk before which none is missing."""
-        self.tables[chunk] = table
+    def gather(self, executor: Executor | None, threads: int | None) -> pa.Table:
+        """The chunks in one table; what is not in the store is computed."""
+        left = []
+        for chunk, rows in self._jobs:
+            if self._store is not None and self._store.rows.get(chunk, 0) >= rows:
+                self._add(chunk, self._store.read(chunk).slice(0, rows), stored=True)
+            else:
+                left.append((chunk, rows))
+        self._tell_store()
+        if self._stopped is None and left:
+            try:
+                self._compute(left, executor, threads)
+            except LostWorkerError as error:
+                place = None if self._store is None else str(self._store.folder)
+                raise WorkerError(str(error), len(self._tables), len(self._jobs), place) from error.__cause__
+        self._tell_store()
+        last = self._looked if self._stopped is not None else len(self._tables)
+        return pa.concat_tables([self._tables[chunk] for chunk in range(last)]).combine_chunks()
+
+    def _compute(self, left: list[tuple[int, int]], executor: Executor | None, threads: int | None) -> None:
+        with contextlib.closing(computed(self._plan, left, executor, threads)) as results:
+            for chunk, outcomes in results:
+                table = table_of(chunk, outcomes, self._schema)
+                if self._store is not None:
+                    self._store.write(chunk, table)
+                self._add(chunk, table)
+                if self._stopped is not None:
+                    return
+
+    def _add(self, chunk: int, table: pa.Table, *, stored: bool = False) -> None:
+        """Keep a chunk, and ask the rule after every chunk before which none is missing."""
+        self._tables[chunk] = table
         if self._until is not None:
-            while self.stopped is None and self._looked in self.tables:
-                self._counts += _counts(self.tables[self._looked])
+            while self._stopped is None and self._looked in self._tables:
+                self._counts += _counts(self._tables[self._looked])
                 self._looked += 1
                 trials = int(self._counts.sum())
                 if self._until.satisfied(self._counts.copy(), trials):
-                    self.stopped = trials
-        return _counts(table)
+                    self._stopped = trials
+        self._bar.add(_counts(table), stored=stored)
 
-    def table(self) -> pa.Table:
-        """All chunks in one table, or those up to where the rule held."""
-        last = self._looked if self.stopped is not None else len(self.tables)
-        return pa.concat_tables([self.tables[chunk] for chunk in range(last)]).combine_chunks()
+    def _tell_store(self) -> None:
+        if self._store is not None:
+            self._store.stop(self._stopped)
 
 
 def _counts(table: pa.Table) -> NDArray[np.int64]:

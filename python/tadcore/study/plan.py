@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.sampling.shapes import Block, Sampler
-from tadcore.scenario.fields import FARTHEST
+from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
 
-from .vary import Quantity, quantities, setups
+from .vary import quantities
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
@@ -75,29 +76,16 @@ class Plan:
 
     def check(self, chunk: int, inputs: NDArray[np.float64]) -> None:
         """Raise `ScenarioError` for the first trial of a chunk whose draws are no game: its path, number and value."""
-        column = 0
-        for quantity in self.quantities:
-            for part in range(quantity.components):
-                values = inputs[:, column]
-                if quantity.field == "position":
-                    good, rule = np.isfinite(values), "a finite number"
-                elif quantity.field == "capture_radius":
-                    good, rule = (values > 0.0) & np.isfinite(values), "a positive finite number"
-                else:
-                    good, rule = values > 0.0, "a positive number, or inf"
-                self._refuse(chunk, quantity.columns[part], values, ~good, rule)
-                if quantity.field == "position":
-                    rule = "a coordinate between -1e100 and 1e100"
-                    self._refuse(chunk, quantity.columns[part], values, np.abs(values) > FARTHEST, rule)
-                column += 1
+        fields = [(name, quantity.field) for quantity in self.quantities for name in quantity.columns]
+        for values, (name, field) in zip(inputs.T, fields, strict=True):
+            for rule in OF_FIELD[field]:
+                self._refuse(chunk, name, values, ~rule.holds(values), rule.words)
         _, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
-            rule = "larger than the defender's capture radius"
             reach, seen = (np.broadcast_to(radii[..., i], len(inputs)) for radii in (capture, sight))
-            bad = reach >= seen
-            if bad.any():
-                rule += f", {float(reach[int(bad.argmax())])!r}"
-            self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, rule)
+            bad = ~sees_whom_it_intercepts(reach, seen)
+            words = f"larger than the defender's capture radius, {float(reach[int(bad.argmax())])!r}"
+            self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, words)
 
     def check_ahead(self, trials: int) -> None:
         """Check what can be checked before anything runs.

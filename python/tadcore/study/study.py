@@ -29,25 +29,28 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import as_index
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
-from tadcore.sampling.adapters import as_sampler
+from tadcore.sampling.adapters import as_sampler, from_table
 from tadcore.sampling.design import DESIGNS, Design
 from tadcore.sampling.shapes import Sampler
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import normal
+from tadcore.scenario.quantities import Quantity, setups
+from tadcore.simulation.run import Run, simulate
 
-from .collect import StoppingRule, collect, jobs_of
+from .collect import Collection, StoppingRule, jobs_of
 from .manifest import Manifest
 from .plan import Plan
 from .progress import Progress
-from .result import StudyResult, load_study
 from .store import Store
 from .table import schema_of
-from .vary import Quantity, normal
+from .trials import Trials
 from .warm_start import warm
 
 __all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
@@ -118,7 +121,7 @@ class Study:
         self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
         samplers: dict[str, Sampler] = {}
         for path, value in vary.items():
-            name = normal(path)
+            name = normal(path, "vary")
             if name in samplers:
                 raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
             samplers[name] = as_sampler(f'vary["{path}"]', value)
@@ -247,8 +250,8 @@ class Study:
         schema = schema_of(self.columns)
         opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), schema)
         with opened as kept, warm(self.scenario, kept_table), Progress(self.trials, wanted=progress) as bar:
-            trials = collect(self._plan, self.trials, kept, bar, schema, executor, workers, until)
-            return StudyResult(self, trials)
+            chunks = Collection(self._plan, self.trials, schema, kept, bar, until)
+            return StudyResult(self, chunks.gather(executor, workers))
 
     def _manifest(self) -> Manifest:
         return Manifest(
@@ -263,3 +266,128 @@ class Study:
     def __repr__(self) -> str:
         paths = ", ".join(self.vary)
         return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"
+
+
+class StudyResult(Trials):
+    """The outcomes of a study, trial by trial; made by `Study.run` and `load_study`.
+
+    Attributes
+    ----------
+    study : Study
+        What was asked for.
+    table : pyarrow.Table
+        One row for each trial: ``trial``, ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none
+        intercepted), ``time``, and a column for each varied component, such as ``attacker.position.x``.
+    scenario : Scenario
+        The scenario around which the inputs vary.
+    seed : int
+        The seed of the study.
+    """
+
+    def __init__(self, study: Study, table: pa.Table) -> None:
+        super().__init__(study.scenario, study.seed, table)
+        object.__setattr__(self, "study", study)
+
+    study: Study
+
+    def setup(self, trial: int) -> Scenario:
+        """The scenario that one trial played: its positions and radii in place of the common ones.
+
+        Parameters
+        ----------
+        trial : int
+            Number of the trial, from 0.
+
+        Raises
+        ------
+        ScenarioError
+            There is no such trial.
+        """
+        row = as_index("trial", trial, self.trials - 1)
+        drawn = np.array([[self.table[name][row].as_py() for name in self.study.columns]])
+        arrays = dict(
+            zip(
+                ("position", "visibility_radius", "capture_radius"),
+                setups(self.scenario, self.study.quantities, drawn),
+                strict=True,
+            )
+        )
+        changes: dict[str, Any] = {}
+        for quantity in self.study.quantities:
+            value = arrays[quantity.field][0, quantity.row]
+            changes[quantity.owner] = value.tolist() if value.ndim else float(value)
+        return self.scenario.replace(changes)
+
+    def replay(self, trial: int) -> Run:
+        """One trial again, everything recorded; its outcome is the one in the table, to the bit.
+
+        Parameters
+        ----------
+        trial : int
+            Number of the trial, from 0.
+
+        Raises
+        ------
+        ScenarioError
+            There is no such trial.
+        """
+        return simulate(self.setup(trial))
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> StudyResult:
+        """`load_study`."""
+        return load_study(folder)
+
+    def __repr__(self) -> str:
+        asked = f" of {self.study.trials:,}" if self.trials < self.study.trials else ""
+        ends = ", ".join(f"{count:,} {name}" for name, count in self.counts().items())
+        return f"StudyResult({self.trials:,}{asked} trials: {ends})"
+
+
+def load_study(folder: str | os.PathLike[str]) -> StudyResult:
+    """Read a study back from its store alone.
+
+    Every part is verified. Of a study that was cut off, the trials before the first missing chunk are returned: chunks
+    that happened to be finished beyond it are left for `Study.run` to build on. The study of the result can be run
+    again to go on, unless it varies by a callable or another object that a store knows by its name only.
+
+    Parameters
+    ----------
+    folder : path
+        The store.
+
+    Returns
+    -------
+    StudyResult
+        The outcomes that are there.
+
+    Raises
+    ------
+    ScenarioError
+        What was given is no path.
+    StoreError
+        The folder is no store, or one of its files is truncated, foreign or damaged.
+    """
+    from tadcore.scenario.model import Scenario
+
+    manifest = Manifest.read(as_path("folder", folder))
+    vary = {path: from_table(f'vary["{path}"]', table, stored=True) for path, table in manifest.vary.items()}
+    study = Study(
+        Scenario.from_toml_string(manifest.scenario, name=os.fspath(folder)),
+        vary,
+        trials=manifest.trials,
+        seed=manifest.seed,
+        design=manifest.design,  # type: ignore[arg-type]  # the constructor checks it
+    )
+    schema = schema_of(manifest.columns)
+    store = Store.reading(folder, schema)
+    wanted = manifest.trials if manifest.stopped is None else manifest.stopped
+    tables = [schema.empty_table()]
+    chunk = 0
+    while wanted > 0 and chunk in store.rows:
+        tables.append(store.read(chunk).slice(0, wanted))
+        wanted -= len(tables[-1])
+        if len(tables[-1]) < manifest.chunk:
+            break
+        chunk += 1
+    return StudyResult(study, pa.concat_tables(tables).combine_chunks())

@@ -10,22 +10,23 @@
     [vary]
     "attacker.position" = { box = [[-3, -3], [3, 3]] }
     "target.position" = { disk = { center = [0, 1], radius = 0.5 } }
-    "defenders.*.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
-    "defenders.0.capture_radius" = { values = [0.1, 0.2] }
+    "d*.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
+    "d1.capture_radius" = { values = [0.1, 0.2] }
 """
 
 from __future__ import annotations
 
-import difflib
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tadcore import scenarios
 from tadcore._shared.files import parse_toml, read_text
+from tadcore._shared.text import similar
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import is_owner
 
 if TYPE_CHECKING:
     from .study import Study
@@ -48,8 +49,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     data = parse_toml(read_text(path), os.fspath(path))
     for key, value in data.items():
         if key not in _KEYS:
-            close = difflib.get_close_matches(key, _KEYS, n=1)
-            hint = f"did you mean {close[0]}?" if close else f"the keys are {', '.join(_KEYS)}"
+            hint = similar(key, _KEYS) or f"the keys are {', '.join(_KEYS)}"
             raise ScenarioError(key, value, f"left out: a study has no such key; {hint}")
     for key in ("scenario", "trials", "vary"):
         if key not in data:
@@ -66,13 +66,7 @@ def _scenario(source: Any, beside: Path) -> Scenario:
         return Scenario.model_validate(source)
     if not isinstance(source, str):
         raise ScenarioError("scenario", source, _KEYS["scenario"])
-    if source in scenarios.names() and not (beside / source).exists():
-        return scenarios.load(source)
-    if not (beside / source).is_file():
-        close = difflib.get_close_matches(source, scenarios.names(), n=1, cutoff=0.5)
-        hint = f"; did you mean {close[0]}?" if close else ""
-        raise ScenarioError("scenario", source, f"a bundled scenario's name, or a file beside the study's{hint}")
-    return Scenario.from_toml(beside / source)
+    return scenarios.find(source, beside, field="scenario")
 
 
 def _flat(tables: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -80,10 +74,7 @@ def _flat(tables: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in tables.items():
         name = f"{prefix}{key}"
-        player = name in ("attacker", "target", "defenders", "*") or (
-            name.startswith("defenders.") and name.count(".") == 1
-        )
-        if isinstance(value, dict) and player:
+        if isinstance(value, dict) and (name == "defenders" or is_owner(name)):
             flat |= _flat(value, f"{name}.")
         else:
             flat[name] = value

@@ -1,0 +1,126 @@
+# ruff: noqa: D301 (the help texts mark blocks that keep their lines with a backspace character)
+"""Commands around one scenario: ``simulate``, ``scenarios`` and ``validate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tadcore import scenarios as bundled
+from tadcore.errors import ScenarioError
+
+from .options import FAILED, Changes, Source, read, usable
+from .terminal import complain, say
+
+__all__ = ["scenarios", "simulate", "validate"]
+
+
+def simulate(
+    scenario: Source,
+    changes: Changes = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there."),
+    ] = None,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the run: into DIR, or in windows.")] = False,
+) -> None:
+    """Play a scenario: print how it ends and when the network changes.
+
+    \b
+      tadcore simulate my.toml
+      tadcore simulate paper-i1 --out run
+      tadcore simulate my.toml --out run --plot
+      tadcore simulate paper-i1 --set 'd*.visibility_radius=inf'
+
+    With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
+    --plot also the figures, as PNG and PDF.
+    """
+    sc = read(scenario, changes)
+    usable(out)
+    if plot and out is None and not _has_windows():
+        raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
+    from tadcore.simulation.run import simulate as play
+
+    run = play(sc)
+    for line in _lines(run):
+        say(line)
+    if out is not None:
+        run.save(out)
+    if plot:
+        _draw(run, out)
+    if out is not None:
+        say(f"written to {out}")
+    if not run.converged:
+        complain(f"the gains of {run.unconverged} instants did not converge")
+        raise typer.Exit(FAILED)
+
+
+def scenarios(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Print this one as TOML.")] = None,
+) -> None:
+    """List the bundled scenarios, or print one as TOML.
+
+    \b
+      tadcore scenarios
+      tadcore scenarios paper-i1 > my.toml
+    """
+    if name is not None:
+        typer.echo(bundled.text(name), nl=False)
+        return
+    for known in bundled.names():
+        say(known)
+        say(bundled.summary(known), indent=4)
+
+
+def validate(
+    scenario: Source,
+    changes: Changes = None,
+) -> None:
+    """Check a scenario file without playing it.
+
+    Every field that breaks a rule is named, with what was found and what it must be.
+    """
+    sc = read(scenario, changes)
+    say(f"{scenario}: valid")
+    for line in sc.describe().splitlines():
+        say(line, indent=2)
+
+
+def _lines(run: Any, most: int = 20) -> list[str]:
+    """The outcome, then one line for each change of the network."""
+    changes = run.network_changes
+    lines = [str(run.outcome), "network:"]
+    for change in changes[:most]:
+        edges = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
+        lines.append(f"  t = {change.time:<8.10g} {'  '.join(edges) or 'no edges'}")
+    if len(changes) > most:
+        lines.append(f"  … and {len(changes) - most} more changes")
+    costs = ", ".join(f"{group} {value:.6g}" for group, value in run.costs.items())
+    return [*lines, f"costs J: {costs}"]
+
+
+def _has_windows() -> bool:
+    import matplotlib as mpl
+
+    return str(mpl.get_backend()).lower() not in {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
+
+
+def _draw(run: Any, out: Path | None) -> None:
+    """The figures of one run: saved into a folder, or shown."""
+    import matplotlib.pyplot as plt
+
+    from tadcore import plotting
+
+    with plotting.style():
+        drawn = {"trajectories": run.plot.trajectories(), "network": run.plot.network()}
+        drawn |= {f"control-{axis}": run.plot.controls(axis=axis) for axis in "xyz"[: run.scenario.dim]}
+        drawn |= {name: getattr(run.plot, name)() for name in ("distances", "visibility", "gains", "theta")}
+        figures = {name: (axes if hasattr(axes, "figure") else axes.flat[0]).figure for name, axes in drawn.items()}
+        if out is None:
+            plt.show()
+        for name, figure in figures.items():
+            if out is not None:
+                plotting.save(figure, out / name)
+            plt.close(figure)

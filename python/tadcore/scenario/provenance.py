@@ -1,0 +1,23 @@
+"""What every file carries: who wrote it, and from which scenario."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING
+
+from tadcore import _core
+
+if TYPE_CHECKING:
+    from .model import Scenario
+
+__all__ = ["provenance"]
+
+
+def provenance(sc: Scenario) -> dict[str, str]:
+    """What every file carries: who wrote it, and from which scenario."""
+    text = sc.to_toml()
+    return {
+        "tadcore_version": _core.__version__,
+        "scenario_sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "scenario": text,
+    }

@@ -1,0 +1,57 @@
+"""The radii that a batch takes: their shapes, and the rules of `tadcore._shared.limits` on every entry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tadcore._shared.arrays import as_real, refuse_where
+from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
+from tadcore.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+__all__ = ["capture_rows", "compare", "visibility_rows"]
+
+
+def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+    """ζ of the m players with limited sight, one row for each game or one for all; the scenario's by default."""
+    m = len(sc.constrained)
+    shared = f"the radii of {', '.join(sc.constrained)}"
+    given = as_real("visibility_radii", sc.visibility_radii if values is None else values, f"numbers: {shared}")
+    if sc.interaction == "I1" and given.ndim in (1, 2) and given.shape[-1] == m + 1:
+        target = given[..., m:]
+        if not (np.isposinf(target)).all():
+            rule = f"{m} columns, or inf in the target's: in I1 the target sees everything"
+            raise ScenarioError("visibility_radii", f"shape {given.shape}", rule)
+        given = given[..., :m]
+    return _rows("visibility_radii", given, games, m, shared, "visibility_radius")
+
+
+def capture_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+    """σ of the defenders and the attacker, one row for each game or one for all; the scenario's by default."""
+    shared = f"the radii of {', '.join(sc.players[: sc.n])}, attacker"
+    given = as_real("capture_radii", sc.capture_radii if values is None else values, f"numbers: {shared}")
+    return _rows("capture_radii", given, games, sc.n + 1, shared, "capture_radius")
+
+
+def _rows(
+    name: str, given: NDArray[np.float64], games: int, columns: int, meaning: str, field: str
+) -> NDArray[np.float64]:
+    """One row of positive radii for each game, or a single one for all."""
+    if given.shape not in ((columns,), (games, columns)):
+        shape = f"of shape ({columns},) or ({games}, {columns}): {meaning}"
+        raise ScenarioError(name, f"shape {given.shape}", shape)
+    for rule in OF_FIELD[field]:
+        refuse_where(name, given, ~rule.holds(given), rule.words)
+    return np.ascontiguousarray(np.atleast_2d(given))
+
+
+def compare(capture: NDArray[np.float64], sight: NDArray[np.float64], n: int) -> None:
+    """Whoever intercepts sees the attacker: σ < ζ for every defender."""
+    bad = ~sees_whom_it_intercepts(capture[:, :n], sight[:, :n])
+    shown = np.broadcast_to(sight[:, :n], bad.shape)
+    refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")

@@ -1,0 +1,136 @@
+"""The outcomes of a study, trial by trial, and what follows from them alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from tadcore.game.outcome import OutcomeKind
+
+from .table import FIXED
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+
+    from tadcore.scenario.model import Scenario
+    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
+
+__all__ = ["Trials"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trials:
+    """Outcomes and inputs, one row for each trial; `StudyResult` is one that knows its study."""
+
+    scenario: Scenario
+    seed: int
+    table: pa.Table
+
+    @property
+    def trials(self) -> int:
+        """Trials in the table: as many as were asked for, or fewer where a rule stopped the study or it was cut off."""
+        return int(self.table.num_rows)
+
+    @cached_property
+    def kind(self) -> NDArray[np.int8]:
+        """Codes of `OutcomeKind`, shape (trials,)."""
+        return self._column("kind")
+
+    @cached_property
+    def defender(self) -> NDArray[np.int32]:
+        """The intercepting defender, 0-based, -1 where none intercepted; shape (trials,)."""
+        return self._column("defender")
+
+    @cached_property
+    def time(self) -> NDArray[np.float64]:
+        """The instant of the end, shape (trials,)."""
+        return self._column("time")
+
+    @cached_property
+    def inputs(self) -> dict[str, NDArray[np.float64]]:
+        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column."""
+        return {name: self._column(name) for name in self.table.column_names if name not in FIXED}
+
+    def counts(self) -> dict[str, int]:
+        """How many games ended in each way."""
+        many = np.bincount(self.kind, minlength=len(OutcomeKind))
+        return {kind.name.lower(): int(many[kind]) for kind in OutcomeKind}
+
+    def probabilities(
+        self, *, level: float = 0.95, method: Literal["wilson", "exact"] = "wilson"
+    ) -> OutcomeProbabilities:
+        """How often each outcome came, with intervals: see `tadcore.statistics.probabilities`.
+
+        Parameters
+        ----------
+        level : float, optional
+            Confidence level of each interval.
+        method : {"wilson", "exact"}, optional
+            Wilson's score interval or Clopper and Pearson's exact one.
+        """
+        from tadcore.statistics import probabilities
+
+        return probabilities(self.kind, self.defender, self.scenario.n, level=level, method=method)
+
+    def incidence(self, *, level: float = 0.95, jointly: bool = False) -> Incidence:
+        """When each outcome came, as cumulative curves with bands: see `tadcore.statistics.incidence`.
+
+        Parameters
+        ----------
+        level : float, optional
+            Confidence level of each band over all instants.
+        jointly : bool, optional
+            Whether the bands hold for all curves at once.
+        """
+        from tadcore.statistics import incidence
+
+        sc = self.scenario
+        return incidence(
+            self.kind,
+            self.defender,
+            self.time,
+            horizon=sc.horizon,
+            step=sc.step,
+            n=sc.n,
+            level=level,
+            jointly=jointly,
+        )
+
+    def compare(self, other: TrialOutcomes, *, level: float = 0.95) -> Comparison:
+        """Set this study beside another on the same draws, trial by trial: see `tadcore.statistics.compare`.
+
+        Parameters
+        ----------
+        other : StudyResult
+            A study of the same seed and trials over a game that differs.
+        level : float, optional
+            Confidence level of each interval.
+        """
+        from tadcore.statistics import compare
+
+        return compare(self, other, level=level)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The table as a pandas data frame."""
+        return self.table.to_pandas()
+
+    def to_polars(self) -> polars.DataFrame:
+        """The table as a Polars data frame; Polars must be installed."""
+        import polars
+
+        frame = polars.from_arrow(self.table)
+        assert isinstance(frame, polars.DataFrame)  # a table never becomes a series
+        return frame
+
+    def _column(self, name: str) -> NDArray[Any]:
+        array: NDArray[Any] = self.table[name].combine_chunks().to_numpy()
+        return array
+
+    def __len__(self) -> int:
+        return self.trials
