@@ -20,6 +20,7 @@ from tadcore._shared.arrays import as_index
 from tadcore.cli.terminal import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
+from tadcore.scenario.paths import label
 from tadcore.simulation.batch import simulate_batch
 
 if TYPE_CHECKING:
@@ -150,6 +151,7 @@ def outcome_map(
 
     from tadcore.scenario.provenance import provenance
 
+    player = label(player)
     if player not in sc.players:
         raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")
     if z is not None and (sc.dim == 2 or not math.isfinite(z)):

@@ -159,7 +159,8 @@ def radius_curve(
     positions : array_like, shape (M, n + 2, dim), optional
         M independent starts; required with a Scenario, and not taken with a study.
     player : str
-        ``"d1"`` … ``"dn"``; in I2 ``"target"`` for its visibility, and ``"attacker"`` for its capture radius.
+        ``"d1"`` … ``"dn"`` (or ``"defenders[0]"`` …); in I2 ``"target"`` for its visibility, and ``"attacker"`` for its
+        capture radius.
     radii : array_like, shape (R,)
         Radii to play, increasing. Visibility may end in inf.
     kind : {"visibility", "capture"}
@@ -196,7 +197,7 @@ def radius_curve(
     if grid.ndim != 1 or grid.size == 0 or np.any(np.diff(grid) <= 0.0):
         raise ScenarioError("radii", radii, "a list of increasing radii")
     own = games.own if reference is None else float(games.checked("reference", reference))
-    played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {player}", show=progress)]
+    played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {games.player}", show=progress)]
     same = np.flatnonzero(grid == own)
     base = played[same[0]] if same.size else games.play(own)
 
@@ -216,7 +217,7 @@ def radius_curve(
     difference = _differences(against_reference, len(rows), confidence)
     slope = _differences(against_last, len(rows), confidence)[..., 1:] / np.diff(grid)
     return RadiusCurve(
-        player=player,
+        player=games.player,
         radius=kind,
         radii=grid,
         names=outcome_names(sc.n),

@@ -11,6 +11,7 @@ from tadcore._shared.arrays import as_positions, as_real, refuse_where
 from tadcore._shared.limits import OF_FIELD
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import label
 from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.starts import Rows, rows_of
@@ -40,13 +41,14 @@ class Replays:
     """The same starts at any radius of one player."""
 
     def __init__(self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None) -> None:
+        player = label(player)
         if kind not in ("visibility", "capture"):
             raise ScenarioError("kind", kind, 'one of "visibility" and "capture"')
         labels = sc.constrained if kind == "visibility" else (*sc.players[: sc.n], "attacker")
         if player not in labels:
             raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
         self.column = component(sc, f"{player}.{kind}_radius").row
-        self.sc, self.rows, self.kind, self.threads = sc, rows, kind, threads
+        self.sc, self.rows, self.player, self.kind, self.threads = sc, rows, player, kind, threads
         self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
 
     def checked(self, field: str, radii: ArrayLike) -> Floats:

@@ -40,9 +40,9 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from tadcore import __version__
+        from tadcore import _core
 
-        say(f"tadcore {__version__}")
+        say(f"tadcore {_core.__version__}")
         raise typer.Exit
 
 

@@ -288,7 +288,8 @@ class Scenario(CheckedModel):
     def _meant(self, path: Any, value: Any) -> Sequence[str]:
         names = super()._meant(path, value)
         if "*" in names[0]:
-            names = expand(path, self.paths)
+            field, _, axis = names[0].rpartition(".")
+            names = expand(path, self.paths) or [f"{name}.{axis}" for name in expand(field, self.paths)]
         if missing := beyond(self.n, path):
             raise ScenarioError(path, value, missing)
         if not names:

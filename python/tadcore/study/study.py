@@ -183,7 +183,7 @@ class Study:
         """Read a study file; raises `ScenarioError` for a file, a key or a value that cannot be accepted."""
         from .toml import read_study
 
-        return read_study(path)
+        return cls(**read_study(path))
 
     def run(
         self,

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tadcore import scenarios
 from tadcore._shared.files import parse_toml, read_text
@@ -27,9 +27,6 @@ from tadcore.errors import MISSING, ScenarioError
 from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import is_owner
-
-if TYPE_CHECKING:
-    from .study import Study
 
 __all__ = ["read_study"]
 
@@ -42,10 +39,8 @@ _KEYS = {
 }
 
 
-def read_study(path: str | os.PathLike[str]) -> Study:
-    """The study that a file describes; raises `ScenarioError`."""
-    from .study import Study
-
+def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a file gives to `tadcore.Study`; raises `ScenarioError`."""
     data = parse_toml(read_text(path), os.fspath(path))
     for key, value in data.items():
         if key not in _KEYS:
@@ -57,8 +52,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     if not isinstance(data["vary"], dict):
         raise ScenarioError("vary", data["vary"], _KEYS["vary"])
     vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(data["vary"]).items()}
-    options = {key: data[key] for key in ("seed", "design") if key in data}
-    return Study(_scenario(data["scenario"], Path(path).parent), vary, trials=data["trials"], **options)
+    options: dict[str, Any] = {key: data[key] for key in ("seed", "design") if key in data}
+    return {"sc": _scenario(data["scenario"], Path(path).parent), "vary": vary, "trials": data["trials"], **options}
 
 
 def _scenario(source: Any, beside: Path) -> Scenario:
