@@ -129,7 +129,7 @@ def sensitivity(
         What holds where nothing varies.
     inputs : mapping of str to distribution
         Independent distributions of single numbers, by name: ``"attacker.position.x"``,
-        ``"defenders.0.visibility_radius"``, ``"target.position.y"``, …; anything with a ``ppf``.
+        ``"d1.visibility_radius"``, ``"target.position.y"``, …; anything with a ``ppf``.
     points : int
         n, a power of 2.
     seed : int

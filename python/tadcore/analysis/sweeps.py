@@ -145,7 +145,7 @@ def sweep(
         What is repeated, with its own trials and seed: the draws are the same in every cell.
     grid : mapping of str to sequence
         Paths of scenario fields and the values they take, such as ``"attacker.control_weight"``, ``"horizon"`` or
-        ``"defenders.*.control_weight"`` (the same for all); what the study varies cannot be swept.
+        ``"d*.control_weight"`` (the same for all); what the study varies cannot be swept.
     progress : bool
         Show a bar for each cell, in a terminal or a notebook.
     store : path, optional

@@ -42,7 +42,7 @@ def study(
       design = "sobol"
       [vary]
       "attacker.position" = { box = [[-3, -3], [3, 3]] }
-      "defenders.0.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
+      "d1.visibility_radius" = { scipy = "uniform", loc = 1, scale = 4 }
 
     Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
     """

@@ -67,7 +67,7 @@ class Study:
         The game; what does not vary is as it says.
     vary : mapping of str to sampler
         Paths of positions, visibility radii and capture radii, such as ``"attacker.position"``,
-        ``"defenders.0.visibility_radius"``, ``"defenders.*.capture_radius"`` or ``"*.position"``, and how to draw
+        ``"d1.visibility_radius"``, ``"d*.capture_radius"`` or ``"*.position"``, and how to draw
         them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
         ``f(rng, size)``. With a wildcard every player draws for itself.
     trials : int
