@@ -20,8 +20,9 @@ from .analysis.maps import OutcomeMap, outcome_map
 from .analysis.radius import RadiusCurve, radius_curve
 from .analysis.sweeps import SweepResult, sweep
 from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, VerificationError, WorkerError
+from .game.changes import NetworkChange
 from .game.equilibrium import Equilibrium, solve_equilibrium
-from .game.network import NetworkChange, VisibilityNetwork
+from .game.network import VisibilityNetwork
 from .game.outcome import Outcome, OutcomeKind
 from .game.synthesis import Gains, synthesize
 from .scenario.model import Attacker, Defender, Scenario, Target

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tadcore import ScenarioError, VisibilityNetwork, scenarios
-from tadcore.game.network import NetworkChange, changes_of, intervals_of
+from tadcore.game.changes import NetworkChange, changes_of, intervals_of
 
 # Example 1 of the paper: n = 4, the network of panel (b).I1 at t₁.
 EXAMPLE = VisibilityNetwork([[1, 1, 0, 0, 0], [1, 1, 1, 1, 0], [0, 0, 0, 0, 0], [0, 0, 1, 0, 1]])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import tadcore
 from tadcore import plotting
+from tadcore.game import Recorded
 
 
 def make() -> tadcore.Scenario:
@@ -35,6 +36,8 @@ def play(sc: tadcore.Scenario) -> tuple[str, float]:
     assert_type(run.adjacency, NDArray[np.bool_])
     assert_type(run.costs, dict[str, float])
     assert_type(run.converged, bool)
+    recorded: Recorded = run
+    assert_type(recorded.position, NDArray[np.float64])
     data: xr.Dataset = run.dataset
     nearest = float(data["distance"].sel(player="d1").min())
     for change in run.network_changes:

@@ -1,9 +1,11 @@
 """The game itself: its equilibrium, its gains, its network, and how it ends."""
 
+from .changes import Interval, NetworkChange
 from .chattering import Chatter
 from .equilibrium import Equilibrium, solve_equilibrium
-from .network import Interval, NetworkChange, VisibilityNetwork
+from .network import VisibilityNetwork
 from .outcome import Outcome, OutcomeKind
+from .recorded import Recorded
 from .synthesis import Gains, synthesize
 
 __all__ = [
@@ -14,6 +16,7 @@ __all__ = [
     "NetworkChange",
     "Outcome",
     "OutcomeKind",
+    "Recorded",
     "VisibilityNetwork",
     "solve_equilibrium",
     "synthesize",

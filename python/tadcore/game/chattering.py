@@ -15,7 +15,7 @@ import numpy as np
 from .network import Edge, edges_of
 
 if TYPE_CHECKING:
-    from tadcore.simulation.run import Run
+    from .recorded import Recorded
 
 __all__ = ["Chatter", "chatter"]
 
@@ -43,7 +43,7 @@ class Chatter:
     flips: int
 
 
-def chatter(run: Run) -> tuple[Chatter, ...]:
+def chatter(run: Recorded) -> tuple[Chatter, ...]:
     """Find the stretches of a run in which an edge flips at almost every instant; the same as ``run.chattering``.
 
     Parameters

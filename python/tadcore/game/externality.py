@@ -19,12 +19,12 @@ from .synthesis import synthesize
 if TYPE_CHECKING:
     import xarray
 
-    from tadcore.simulation.run import Run
+    from .recorded import Recorded
 
 __all__ = ["control_jumps"]
 
 
-def control_jumps(run: Run) -> xarray.Dataset:
+def control_jumps(run: Recorded) -> xarray.Dataset:
     """The jump in every player's control at every change of the network.
 
     Parameters

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import as_amount
+from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.compiled import game_of
-from tadcore.game.network import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.outcome import Outcome
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter
     from matplotlib.figure import Figure
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 _BEAT = 0.4  # seconds for which the picture rests where the network changes
 _BEATS = 4.0  # seconds of rest in all; a restless network gets shorter beats, at last none
@@ -35,7 +35,7 @@ class Frame:
     over: bool = False
 
 
-def frames_of(run: Run, seconds: float, fps: float) -> list[Frame]:
+def frames_of(run: Recorded, seconds: float, fps: float) -> list[Frame]:
     """Return the frames: equal steps of time, a rest at every network change, a rest at the end."""
     last = len(run.times) - 1
     count = max(round(seconds * fps), 2)
@@ -63,7 +63,7 @@ class Animation:
         Pictures in a second.
     """
 
-    def __init__(self, run: Run, *, seconds: float = 8.0, fps: float = 20.0, width: float = 7.2) -> None:
+    def __init__(self, run: Recorded, *, seconds: float = 8.0, fps: float = 20.0, width: float = 7.2) -> None:
         for name, value in (("seconds", seconds), ("fps", fps), ("width", width)):
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{name}: got {value!r}, must be a positive number")

@@ -12,15 +12,15 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from tadcore.plotting.run.network import draw_graph
-from tadcore.plotting.run.paths import disc, positions
+from tadcore.plotting.run.paths import disc
 from tadcore.plotting.tools.inset import filled
-from tadcore.plotting.tools.style import edge_text, look, outcome_text, players
+from tadcore.plotting.tools.style import edge_text, look, outcome_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
     from .animation import Frame
 
@@ -35,11 +35,11 @@ _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 73)
 class Scene:
     """The figure of an animation, and how to set it to a frame."""
 
-    def __init__(self, run: Run, width: float) -> None:
+    def __init__(self, run: Recorded, width: float) -> None:
         self.figure = Figure(figsize=(width, _HEIGHT * width))
         FigureCanvasAgg(self.figure)
         self._run = run
-        self._where = positions(run)
+        self._where = run.position
         self._radii = dict(zip(run.scenario.constrained, run.scenario.visibility_radii, strict=True))
         self._arena = self._make_arena()
         self._graph = self.figure.add_axes((0.69, 0.14, 0.3, 0.3 / _HEIGHT))
@@ -48,7 +48,7 @@ class Scene:
         self._seen: list[Line2D] = []
         self._network: object = None
         self._over = False
-        self._movers = [self._mover(player) for player in players(run)]
+        self._movers = [self._mover(player) for player in run.scenario.players]
         changes = run.network_changes
         self._starts = [int(np.argmin(np.abs(run.times - change.time))) for change in changes]
         self._edges = [set(interval.edges) for interval in run.intervals()]
@@ -57,7 +57,7 @@ class Scene:
         """Set everything to one frame."""
         k = frame.k
         since = max(k - int(_RECENT * len(self._where)), 0)
-        for p, (player, mover) in enumerate(zip(players(self._run), self._movers, strict=True)):
+        for p, (player, mover) in enumerate(zip(self._run.scenario.players, self._movers, strict=True)):
             path = self._where[: k + 1, p]
             _set(mover["trail"], path)
             _set(mover["recent"], path[since:])
@@ -105,11 +105,11 @@ class Scene:
         if (now, beat) != self._network:
             self._network = (now, beat)
             self._graph.clear()
-            draw_graph(self._graph, players(self._run), self._edges[now], new, lost)
+            draw_graph(self._graph, self._run.scenario.players, self._edges[now], new, lost)
             self._graph.set_title("who sees whom")
 
     def _sight_line(self, k: int, observer: str, seen: str) -> Line2D:
-        names = players(self._run)
+        names = self._run.scenario.players
         ends = self._where[k, [names.index(observer), names.index(seen)]]
         (line,) = self._arena.plot(*ends.T, color="black", linewidth=1.4, zorder=2.8)
         return line

@@ -9,20 +9,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 
 class Plots:
     """Figures of one run; every method is the function of that name in `tadcore.plotting`, which says more."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Recorded) -> None:
         self._run = run
 
     def trajectories(
         self,
         ax: Axes | None = None,
         *,
-        full: Run | None = None,
+        full: Recorded | None = None,
         names: tuple[str, str] = ("limited observations", "full observation"),
         edge_markers: bool = True,
         capture_discs: bool = True,

@@ -11,18 +11,18 @@ from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, outcome_text
 
 from .paths import LAID_UNDER, name_runs
-from .series import known_axis, span
+from .series import known_axis, span, to_attacker
 from .trajectories import trajectories
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 
 def compare(
-    run_a: Run,
-    run_b: Run,
+    run_a: Recorded,
+    run_b: Recorded,
     *,
     what: Literal["trajectories", "controls", "distances"] = "trajectories",
     axis: str = "x",
@@ -71,9 +71,9 @@ def compare(
     last = max(run_a, run_b, key=lambda run: run.times[-1])  # names stand at the frame, where this one's curves end
     ends = []
     for run, dashed in ((run_b, True), (run_a, False)):
+        distances = to_attacker(run)
         for i, player in enumerate(shown):
-            part = run.dataset["control" if what == "controls" else "distance"].sel(player=player)
-            values = np.asarray((part.sel(axis=axis) if what == "controls" else part).values, dtype=float)
+            values = run.control[:, i, "xyz".index(axis)] if what == "controls" else distances[i]
             it = look(player)
             width: dict[str, Any] = {"linestyle": LAID_UNDER, "linewidth": 0.9} if dashed else {}
             common: dict[str, Any] = {"color": it.colour, "zorder": 2.0 if dashed else 2.5}
@@ -94,10 +94,10 @@ def compare(
     return ax
 
 
-def _full(run: Run) -> bool:
+def _full(run: Recorded) -> bool:
     return bool(np.isinf(run.scenario.visibility_radii).all())
 
 
-def _names(run_a: Run, run_b: Run) -> tuple[str, str]:
+def _names(run_a: Recorded, run_b: Recorded) -> tuple[str, str]:
     a, b = ("full observation" if _full(run) else "limited observations" for run in (run_a, run_b))
     return (a, b) if a != b else (outcome_text(run_a), outcome_text(run_b))

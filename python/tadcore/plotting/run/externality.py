@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore.game.externality import control_jumps
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.style import PAGE, edge_text, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 __all__ = ["externality"]
 
@@ -21,7 +22,7 @@ MAX_NAMED = 12
 _ROOM = 0.6  # inches that the edges of one change take; in narrower places they stand upright
 
 
-def externality(run: Run, *, ax: Axes | None = None) -> Axes:
+def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
     """Draw how far each player's control jumps at every change of the network.
 
     A filled marker is the jump of a player whose own edge changed; an open one is the jump of another player, which is
@@ -39,8 +40,6 @@ def externality(run: Run, *, ax: Axes | None = None) -> Axes:
     Axes
         The axes drawn in.
     """
-    from tadcore.game.externality import control_jumps
-
     found = control_jumps(run)
     ax = new_axes(ax, PAGE, 2.6)
     count = found.sizes["time"]
@@ -86,7 +85,7 @@ def externality(run: Run, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _named(run: Run, time: float) -> str:
+def _named(run: Recorded, time: float) -> str:
     change = next(c for c in run.network_changes if c.time == time)
     parts = [edge_text(p, [q]) for p, q in change.added] + [edge_text(p, [q], lost=True) for p, q in change.removed]
     return "\n".join(parts)

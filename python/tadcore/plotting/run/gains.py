@@ -17,11 +17,11 @@ from .series import MAX_VERTICALS, mark_changes, span
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 
 def gains(
-    run: Run, axes: Axes | NDArray[Any] | None = None, *, columns: int = 1, changes: bool = True
+    run: Recorded, axes: Axes | NDArray[Any] | None = None, *, columns: int = 1, changes: bool = True
 ) -> Axes | NDArray[Any]:
     r"""Draw the rows :math:`g_i` of the feedback :math:`u_i = g_i z`, a panel per player with limited sight.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,14 +10,13 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
 from tadcore.plotting.tools.axes import new_panels
-from tadcore.plotting.tools.style import look, note, players
+from tadcore.plotting.tools.style import look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
-
-Edge = tuple[str, str]
+    from tadcore.game.network import Edge
+    from tadcore.game.recorded import Recorded
 
 _NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
 _SMALL = 7.5  # points
@@ -45,7 +45,7 @@ _LOST: dict[str, Any] = {
 
 
 def network(
-    run: Run, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
+    run: Recorded, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
 ) -> Axes | NDArray[Any]:
     r"""Draw the directed visibility graph, a panel per interval on which it does not change.
 
@@ -70,21 +70,20 @@ def network(
     Axes or array of Axes
         ``axes`` as given, or the array of the new ones.
     """
-    changes = list(run.network_changes)
+    changes = run.network_changes
     if axes is None:
         count = max(min(len(changes), max_panels), 1)
         axes = new_panels(count, columns, page_from=4, row=0.22, rest=0.0, square=True)
     panels = list(np.asarray(axes, dtype=object).ravel())
     shown = min(len(changes), max_panels, len(panels))
-    end = float(run.outcome.time)
     edges: set[Edge] = set()
     for k in range(shown):
         time, added, removed = changes[k]
-        new, lost = {_edge(e) for e in added}, {_edge(e) for e in removed}
+        new, lost = set(added), set(removed)
         edges = (edges | new) - lost
         last = k + 1 == len(changes)
-        until = end if last else float(changes[k + 1][0])
-        draw_graph(panels[k], players(run), edges, new if k else set(), lost)
+        until = run.outcome.time if last else changes[k + 1].time
+        draw_graph(panels[k], run.scenario.players, edges, new if k else set(), lost)
         title = panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
         if panels[k].get_window_extent().width < _NARROW * panels[k].figure.dpi:
             title.set_fontsize(min(title.get_fontsize(), _SMALL))
@@ -97,12 +96,7 @@ def network(
     return axes
 
 
-def _edge(edge: Any) -> Edge:
-    observer, seen = edge
-    return str(observer), str(seen)
-
-
-def _places(names: list[str]) -> dict[str, NDArray[np.float64]]:
+def _places(names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """Return where each player stands on the unit circle, clockwise: attacker, target, dn … d1."""
     around = ["attacker", "target", *reversed(names[:-2])]
     half = np.pi / len(around)
@@ -110,7 +104,7 @@ def _places(names: list[str]) -> dict[str, NDArray[np.float64]]:
     return {p: np.array([np.cos(a), np.sin(a)]) for p, a in zip(around, angle, strict=True)}
 
 
-def draw_graph(ax: Axes, names: list[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
+def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
     """Draw one graph, ``new`` edges thick and ``lost`` ones dotted."""
     at = _places(names)
     node = min(0.2, 0.8 * np.sin(np.pi / len(names)))

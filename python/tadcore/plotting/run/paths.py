@@ -11,12 +11,12 @@ from matplotlib.patches import Circle, FancyArrowPatch
 from numpy.typing import NDArray
 
 from tadcore.plotting.tools.axes import above
-from tadcore.plotting.tools.style import look, players
+from tadcore.plotting.tools.style import look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 Floats = NDArray[np.float64]
 
@@ -26,20 +26,15 @@ _AT_START = 0.015  # of the diagonal; a mark nearer than this would hide the mar
 _SIZES = {"*": 7.5, "X": 5.8}
 
 
-def positions(run: Run) -> Floats:
-    """Return the positions, shape (L + 1, n + 2, dim)."""
-    return np.asarray(run.dataset["position"].transpose("time", "player", "axis").values, dtype=float)
-
-
-def paths(ax: Axes, run: Run, *, dashed: bool, marks: Floats | None = None) -> None:
+def paths(ax: Axes, run: Recorded, *, dashed: bool, marks: Floats | None = None) -> None:
     """Draw every path: solid with a hollow marker where it starts and a filled one where it ends, or dashed and pale.
 
     ``marks`` are points that will be marked on top; a start under one gets a marker large enough to show around it.
     """
-    position = positions(run)
+    position = run.position
     corners = position.reshape(-1, position.shape[-1])
     near = _AT_START * float(np.linalg.norm(np.ptp(corners, axis=0)))
-    for p, player in enumerate(players(run)):
+    for p, player in enumerate(run.scenario.players):
         path, it = position[:, p], look(player)
         ax.plot(
             *path.T,
@@ -100,13 +95,13 @@ def _heading(ax: Axes, path: Floats, colour: str) -> None:
     ax.add_patch(arrow)
 
 
-def disc(ax: Axes, run: Run, *, dashed: bool) -> None:
+def disc(ax: Axes, run: Recorded, *, dashed: bool) -> None:
     """Draw the capture disc of whoever ended the game: the interceptor's, or the attacker's."""
-    names, outcome = players(run), run.outcome
+    names, outcome = run.scenario.players, run.outcome
     if outcome.kind == "timeout":
         return
     winner = int(outcome.defender) if outcome.kind == "intercepted" and outcome.defender is not None else -1
-    centre = positions(run)[-1, winner]
+    centre = run.position[-1, winner]
     radius = float(run.scenario.capture_radii[winner])
     colour = look(names[winner]).colour
     if len(centre) == 3:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from tadcore.game.network import Edge
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 MAX_ROWS = 24
 """Where more edges than this are possible, `visibility` leaves out those that never form."""
@@ -22,7 +22,7 @@ MAX_ROWS = 24
 _ROW = 9.0  # points that one row with a name needs
 
 
-def visibility(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw a raster of the visibility network: a row per edge, a bar wherever the edge is there.
 
     Rows are grouped by observer, d1 on top; bars are in the observer's colour. The row :math:`d_2\to a` says when
@@ -70,7 +70,7 @@ def visibility(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axe
     return ax
 
 
-def bars_of(run: Run) -> dict[Edge, list[tuple[float, float]]]:
+def bars_of(run: Recorded) -> dict[Edge, list[tuple[float, float]]]:
     """Return, for each edge that ever forms, the stretches of time over which it is there."""
     players, attacker = run.scenario.players, run.scenario.n + 1
     in_force = run.adjacency[:-1].astype(np.int8)
@@ -84,7 +84,7 @@ def bars_of(run: Run) -> dict[Edge, list[tuple[float, float]]]:
     return spans
 
 
-def _rows(run: Run) -> list[Edge]:
+def _rows(run: Recorded) -> list[Edge]:
     """Return the edges to draw, by observer: every possible one where they are few, else those that ever form."""
     names = run.scenario.players
     possible = [(p, q) for p in run.scenario.constrained for q in names if q != p]

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
-from tadcore.plotting.tools.style import COLUMN, look, note, players
+from tadcore.plotting.tools.style import COLUMN, look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ _TERMS = {
 
 
 def controls(
-    run: Run,
+    run: Recorded,
     axis: str = "x",
     *,
     players: Sequence[str] | None = None,
@@ -63,13 +63,12 @@ def controls(
     ValueError
         The game has no such player or no such axis.
     """
-    shown = [players] if isinstance(players, str) else list(players) if players is not None else _constrained(run)
+    shown = [players] if isinstance(players, str) else run.scenario.constrained if players is None else list(players)
     _known(run, shown)
     known_axis(run, axis)
     ax = new_axes(ax, COLUMN, 2.3)
-    control = run.dataset["control"].sel(axis=axis)
-    curves = {p: np.asarray(control.sel(player=p).values, dtype=float) for p in shown}
-    _curves(ax, run, curves)
+    control = run.control[..., "xyz".index(axis)]
+    _curves(ax, run, {p: control[:, run.scenario.players.index(p)] for p in shown})
     if changes:
         mark_changes(ax, run)
     who = ", ".join(look(p).symbol for p in shown) if len(shown) < 3 else "players"
@@ -77,7 +76,7 @@ def controls(
     return ax
 
 
-def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw each player's distance to the attacker, with its capture radius σ and visibility radius ζ.
 
     Capture radii are dotted, a single line where all are equal; visibility radii that fall inside the picture are thin
@@ -98,12 +97,11 @@ def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes
         The axes drawn in.
     """
     ax = new_axes(ax, COLUMN, 2.5)
-    names = players(run)[:-1]
-    distance = run.dataset["distance"]
-    curves = {p: np.asarray(distance.sel(player=p).values, dtype=float) for p in names}
+    names = run.scenario.players[:-1]
+    curves = dict(zip(names, to_attacker(run), strict=True))
     top = 1.06 * max(float(c.max()) for c in curves.values())
     rims: list[tuple[float, str, str]] = []
-    sigma = np.asarray(run.scenario.capture_radii, dtype=float)
+    sigma = run.scenario.capture_radii
     if np.ptp(sigma) == 0:
         rims.append((float(sigma[0]), r"$\sigma$", "0.25"))
     else:
@@ -112,7 +110,7 @@ def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes
         rims += list(zip(sigma.tolist(), symbols, colours, strict=True))
     for radius, _, colour in rims:
         ax.axhline(radius, color=colour, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1.5)
-    for p, radius in zip(names, np.asarray(run.scenario.visibility_radii, dtype=float), strict=False):
+    for p, radius in zip(names, run.scenario.visibility_radii, strict=False):
         if np.isfinite(radius) and radius < top:
             it = look(p)
             ax.axhline(radius, color=it.colour, linewidth=0.6, linestyle=it.dashes, alpha=0.8, zorder=1.4)
@@ -125,7 +123,7 @@ def distances(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes
     return ax
 
 
-def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
+def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw the synthesis objective :math:`\Theta` and the squared norms that make it up, on a logarithmic scale.
 
     Where everyone sees everyone :math:`\Theta = 0` and the curves leave the picture.
@@ -145,13 +143,10 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
         The axes drawn in.
     """
     ax = new_axes(ax, COLUMN, 2.3)
-    times = np.asarray(run.dataset["time"].values, dtype=float)
-    total = np.asarray(run.dataset["theta"].values, dtype=float)
-    terms = np.asarray(run.dataset["theta_terms"].values, dtype=float)
+    times = run.times
     # exactly zero where everyone sees everyone, whatever rounding leaves there
-    seen = np.asarray(run.dataset["adjacency"].values, dtype=bool)
-    everyone = seen.reshape(len(times), -1).all(axis=1)
-    total, terms = np.where(everyone, 0.0, total), np.where(np.expand_dims(everyone, 1), 0.0, terms)
+    everyone = np.asarray(run.adjacency.all(axis=(1, 2)))
+    total, terms = np.where(everyone, 0.0, run.theta), np.where(everyone[:, None], 0.0, run.theta_terms)
     scale = float(max(total.max(), terms.max()))
     ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=span(times))
     if scale <= 0:
@@ -160,7 +155,7 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
         ax.text(0.5, 0.56, r"$\Theta=0$: everyone sees everyone", transform=ax.transAxes, ha="center", va="bottom")
         return ax
     ax.set_yscale("log")
-    names = [r"$\Theta$", *_TERMS.get(terms.shape[1], [f"term {i + 1}" for i in range(terms.shape[1])])]
+    names = [r"$\Theta$", *_TERMS[terms.shape[1]]]
     lines = []
     for i, (name, values) in enumerate(zip(names, [total, *terms.T], strict=True)):
         it = look(f"d{i}") if i else None
@@ -185,20 +180,21 @@ def theta(run: Run, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     return ax
 
 
-def _constrained(run: Run) -> list[str]:
-    return [str(p) for p in run.dataset["observer"].values]
+def to_attacker(run: Recorded) -> list[Floats]:
+    """Return the distances to the attacker over time, one array for each other player."""
+    return list(np.linalg.norm(run.position[:, :-1] - run.position[:, -1:], axis=-1).T)
 
 
-def _known(run: Run, shown: Sequence[str]) -> None:
+def _known(run: Recorded, shown: Sequence[str]) -> None:
     for p in shown:
-        if p not in players(run):
-            raise ValueError(f"no player {p!r}; this game has {', '.join(players(run))}")
+        if p not in run.scenario.players:
+            raise ValueError(f"no player {p!r}; this game has {', '.join(run.scenario.players)}")
 
 
-def known_axis(run: Run, axis: str) -> None:
+def known_axis(run: Recorded, axis: str) -> None:
     """Refuse a component that the game does not have."""
-    axes = [str(a) for a in run.dataset["axis"].values]
-    if axis not in axes:
+    axes = "xyz"[: run.scenario.dim]
+    if axis not in tuple(axes):
         raise ValueError(f"axis: got {axis!r}, must be one of {', '.join(axes)}")
 
 
@@ -207,9 +203,9 @@ def span(times: Floats) -> tuple[float, float]:
     return float(times[0]), float(times[-1]) if times[-1] > times[0] else float(times[0]) + 1.0
 
 
-def _curves(ax: Axes, run: Run, curves: dict[str, Floats], rims: Sequence[tuple[float, str, str]] = ()) -> None:
+def _curves(ax: Axes, run: Recorded, curves: dict[str, Floats], rims: Sequence[tuple[float, str, str]] = ()) -> None:
     """Draw one curve per player, named at its right end; ``rims`` are named there too."""
-    times = np.asarray(run.dataset["time"].values, dtype=float)
+    times = run.times
     ends: list[tuple[float, str, str]] = []
     restless = len(run.network_changes) > MAX_VERTICALS
     for i, (player, values) in enumerate(curves.items()):
@@ -234,9 +230,9 @@ def _curves(ax: Axes, run: Run, curves: dict[str, Floats], rims: Sequence[tuple[
     label_ends(ax, [*ends, *rims])
 
 
-def mark_changes(ax: Axes, run: Run, *, say: bool = True) -> None:
+def mark_changes(ax: Axes, run: Recorded, *, say: bool = True) -> None:
     """Mark each network change: a dashed vertical, or a tick at the foot and a remark where they are many."""
-    times = [float(change[0]) for change in list(run.network_changes)[1:]]
+    times = [change.time for change in run.network_changes[1:]]
     kind: dict[str, Any] = {"color": "0.45", "zorder": 1.2}
     if len(times) <= MAX_VERTICALS:
         for t in times:

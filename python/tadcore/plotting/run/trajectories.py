@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
-from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text, players
+from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
 
-from .paths import disc, name_runs, paths, positions
+from .paths import disc, name_runs, paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 Floats = NDArray[np.float64]
 
@@ -37,10 +37,10 @@ class _Mark:
 
 
 def trajectories(
-    run: Run,
+    run: Recorded,
     ax: Axes | None = None,
     *,
-    full: Run | None = None,
+    full: Recorded | None = None,
     names: tuple[str, str] = ("limited observations", "full observation"),
     edge_markers: bool = True,
     capture_discs: bool = True,
@@ -57,7 +57,7 @@ def trajectories(
         The run to draw, solid.
     ax : Axes, optional
         Where to draw; new axes of a one-column figure if not given. Must be 3-D axes for a game in space.
-    full : Run, optional
+    full : Recorded, optional
         A second run to lay under the first, dashed: as a rule the same game under full observation.
     names : (str, str)
         What the legend calls ``run`` and ``full`` where both are drawn.
@@ -80,7 +80,7 @@ def trajectories(
     """
     dim = int(run.scenario.dim)
     shown = [run] if full is None else [run, full]
-    points = np.concatenate([positions(r).reshape(-1, dim) for r in shown])
+    points = np.concatenate([r.position.reshape(-1, dim) for r in shown])
     low, high = points.min(axis=0), points.max(axis=0)
     pad = 0.09 * max(float((high - low).max()), 1e-9)
     low, high = low - pad, high + pad
@@ -98,7 +98,7 @@ def trajectories(
 
     draw(ax, marked=True)
     _limits(ax, dim, low, high)
-    ends = np.concatenate([positions(r)[-1] for r in shown])
+    ends = np.concatenate([r.position[-1] for r in shown])
     crowded = crowd(ax, ends, low, high) if zoom and dim == 2 else None
     inset = None
     if crowded is not None:
@@ -140,46 +140,45 @@ def _limits(ax: Axes, dim: int, low: Floats, high: Floats) -> None:
     ax.set_aspect("equal", adjustable="box" if shared else "datalim")
 
 
-def _marks(run: Run) -> list[_Mark]:
-    times = np.asarray(run.dataset["time"].values, dtype=float)
-    position, names = positions(run), players(run)
+def _marks(run: Recorded) -> list[_Mark]:
+    names = run.scenario.players
     marks = []
-    for time, added, removed in list(run.network_changes)[1:]:
-        k = int(np.argmin(np.abs(times - time)))
+    for time, added, removed in run.network_changes[1:]:
+        k = int(np.argmin(np.abs(run.times - time)))
         for edges, lost in ((added, False), (removed, True)):
             seen: dict[str, list[str]] = {}
             for observer, other in edges:
-                seen.setdefault(str(observer), []).append(str(other))
+                seen.setdefault(observer, []).append(other)
             for observer, others in seen.items():
-                point = position[k, names.index(observer)]
+                point = run.position[k, names.index(observer)]
                 marks.append(_Mark(observer, edge_text(observer, others, lost=lost), point))
     return marks
 
 
-def _labels(ax: Axes, shown: list[Run], marks: list[_Mark], inset: Axes | None) -> None:
+def _labels(ax: Axes, shown: list[Recorded], marks: list[_Mark], inset: Axes | None) -> None:
     """Name the players at their starts and the edges at their marks, clear of everything drawn."""
     labels = Labels(ax)
     if inset is not None:  # the frame around what it magnifies
         (left, right), (bottom, top) = inset.get_xlim(), inset.get_ylim()
         labels.avoid_curve([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)])
     for run in reversed(shown):
-        position = positions(run)
+        position = run.position
         for p in range(position.shape[1]):
             labels.avoid_curve(position[:, p])
             labels.avoid_spot(position[-1, p])
-    for point, player in zip(positions(shown[0])[0], players(shown[0]), strict=True):
+    for point, player in zip(shown[0].position[0], shown[0].scenario.players, strict=True):
         it = look(player)
         labels.avoid_spot(point)
         labels.add(point, it.symbol, color=it.colour, zorder=4.6, leader_from=14.0)
     _edges(ax, shown[0], marks, labels)
 
 
-def _ends(inset: Axes, run: Run) -> None:
+def _ends(inset: Axes, run: Recorded) -> None:
     """Name the players that are seen to end in the inset."""
     labels = Labels(inset)
     low, high = np.array([inset.get_xlim(), inset.get_ylim()]).T
-    position = positions(run)
-    for p, player in enumerate(players(run)):
+    position = run.position
+    for p, player in enumerate(run.scenario.players):
         labels.avoid_curve(position[((position[:, p] > low) & (position[:, p] < high)).all(axis=1), p][:, :])
         if ((position[-1, p] > low) & (position[-1, p] < high)).all():
             it = look(player)
@@ -187,7 +186,7 @@ def _ends(inset: Axes, run: Run) -> None:
             labels.add(position[-1, p], it.symbol, color=it.colour, fontsize="small", leader_from=8.0)
 
 
-def _edges(ax: Axes, run: Run, marks: list[_Mark], labels: Labels) -> None:
+def _edges(ax: Axes, run: Recorded, marks: list[_Mark], labels: Labels) -> None:
     labelled = marks
     if len(marks) > MAX_EDGE_LABELS:
         kinds = list({mark.text: mark for mark in reversed(marks)}.values())[::-1]

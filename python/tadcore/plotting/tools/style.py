@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
-    from tadcore.simulation.run import Run
+    from tadcore.game.recorded import Recorded
 
 COLUMN = 3.5
 """Width in inches of one journal column."""
@@ -101,12 +101,7 @@ def edge_text(observer: str, seen: Sequence[str], *, lost: bool = False) -> str:
     return f"${symbol(observer)}{arrow} {others}$"
 
 
-def players(run: Run) -> list[str]:
-    """Return the labels of all players, d1…dn, target, attacker."""
-    return [str(p) for p in run.scenario.players]
-
-
-def outcome_text(run: Run) -> str:
+def outcome_text(run: Recorded) -> str:
     """Return the outcome in a line of mathtext, for a title."""
     at = f"$t={run.outcome.time:.6g}$"
     if run.outcome.kind == "intercepted":

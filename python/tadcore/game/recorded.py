@@ -1,0 +1,67 @@
+"""What a recorded game is to those who draw or examine it.
+
+`tadcore.Run` is one. Figures and the functions of this package take anything of this shape, so that they know nothing
+of how a game is played, and a run can offer its figures as methods.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from tadcore.scenario.model import Scenario
+
+    from .changes import Interval, NetworkChange
+    from .outcome import Outcome
+
+__all__ = ["Recorded"]
+
+
+class Recorded(Protocol):
+    """A game of n defenders with its L + 1 instants; shapes and orders are those of `tadcore.Run`."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was played."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Instants, shape (L + 1,)."""
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Positions, shape (L + 1, n + 2, dim)."""
+
+    @property
+    def control(self) -> NDArray[np.float64]:
+        """Controls, shape (L + 1, n + 2, dim)."""
+
+    @property
+    def adjacency(self) -> NDArray[np.bool_]:
+        """𝒜, shape (L + 1, m, N); the last row repeats the last network in force."""
+
+    @property
+    def gains(self) -> NDArray[np.float64]:
+        """Rows of the feedback, shape (L + 1, m, N)."""
+
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Θ₁ or Θ₂, shape (L + 1,)."""
+
+    @property
+    def theta_terms(self) -> NDArray[np.float64]:
+        """Its terms, unweighted, shape (L + 1, 4 or 3)."""
+
+    @property
+    def network_changes(self) -> tuple[NetworkChange, ...]:
+        """The initial network, then every change."""
+
+    def intervals(self) -> tuple[Interval, ...]:
+        """The stretches of time with one network."""
