@@ -12,12 +12,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
+
 from . import statistics
 from ._shared.files import write_whole
 from .errors import ScenarioError
 from .scenario.provenance import provenance
 from .statistics import TrialOutcomes
-from .statistics.outcomes import Floats, indicators
+from .statistics.outcomes import indicators
 
 __all__ = ["report"]
 

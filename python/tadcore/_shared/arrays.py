@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,13 @@ from tadcore.errors import ScenarioError
 
 from .limits import COORDINATE, FINITE
 
+Floats: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
+
 _LISTED = 20
 
 
-def as_real(field: str, values: ArrayLike, rule: str) -> NDArray[np.float64]:
+def as_real(field: str, values: ArrayLike, rule: str) -> Floats:
     """A C-contiguous float64 array from real numbers; strings, bools, ragged lists and masked entries are refused."""
     try:
         array = np.asarray(values)
@@ -42,7 +45,7 @@ def refuse_where(field: str, array: NDArray[Any], bad: NDArray[np.bool_], rule: 
     raise ScenarioError.collect(errors)
 
 
-def as_positions(values: ArrayLike, shape: tuple[int, ...], *, rows: bool = False) -> NDArray[np.float64]:
+def as_positions(values: ArrayLike, shape: tuple[int, ...], *, rows: bool = False) -> Floats:
     """Finite positions of `shape`, or with `rows` any number of such arrays stacked."""
     wanted = f"({', '.join([*(['M'] if rows else []), *map(str, shape)])})"
     rule = f"an array of finite numbers of shape {wanted}, players ordered d1 … dn, target, attacker"

@@ -2,50 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.simulation.batch import Batch
+from tadcore.statistics.radius import Breakpoints
 
 from .replays import Replays
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Breakpoints:
-    """Radii at which the outcome of a trial changes, ordered by trial, then by radius.
-
-    Attributes
-    ----------
-    trial : ndarray of int, shape (B,)
-        Which trial.
-    radius : ndarray, shape (B,)
-        The least radius at which the new outcome holds, to within ``tolerance`` from above.
-    kind_before, kind_after : ndarray of int8, shape (B,)
-        Codes of `OutcomeKind` below and at ``radius``.
-    defender_before, defender_after : ndarray of int32, shape (B,)
-        The intercepting defender, 0-based; -1 where none intercepts.
-    tolerance : float
-        How far above the true breakpoint ``radius`` may lie.
-    """
-
-    trial: NDArray[np.int64]
-    radius: Floats
-    kind_before: NDArray[np.int8]
-    kind_after: NDArray[np.int8]
-    defender_before: NDArray[np.int32]
-    defender_after: NDArray[np.int32]
-    tolerance: float
-
-    def __len__(self) -> int:
-        return len(self.trial)
-
-    def __repr__(self) -> str:
-        return f"Breakpoints({len(self):,} in {len(np.unique(self.trial)):,} trials)"
 
 
 def breakpoints(games: Replays, grid: Floats, played: list[Batch], tolerance: float) -> Breakpoints:

@@ -20,119 +20,26 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from tadcore.cli.terminal import bar
 from tadcore.errors import ScenarioError
-from tadcore.statistics import difference_interval, outcome_names, proportion_interval
+from tadcore.statistics import outcome_names, proportion_interval
 from tadcore.statistics.comparison import discordant
-from tadcore.statistics.outcomes import Floats, Integers, as_level, indicators
+from tadcore.statistics.outcomes import as_level, indicators
+from tadcore.statistics.radius import Breakpoints, RadiusCurve, RadiusKind, paired_differences
 
-from .breakpoints import Breakpoints, breakpoints
-from .replays import RadiusKind, Replays, starts_of
+from .breakpoints import breakpoints
+from .replays import Replays, starts_of
 
 if TYPE_CHECKING:
-    import xarray
-
     from tadcore.scenario.model import Scenario
     from tadcore.statistics import TrialOutcomes
 
 __all__ = ["Breakpoints", "RadiusCurve", "radius_curve"]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RadiusCurve:
-    """Outcome probabilities against one radius; made by `radius_curve`.
-
-    Attributes
-    ----------
-    player : str
-        Whose radius.
-    radius : {"visibility", "capture"}
-        Which one: ζ or σ.
-    radii : ndarray, shape (R,)
-        Where it was evaluated.
-    names : tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
-    estimate, low, high : ndarray, shape (3 + n, R)
-        Probabilities with pointwise intervals.
-    band_low, band_high : ndarray, shape (3 + n, R)
-        The band that holds at all radii at once.
-    reference : float
-        The radius that differences are taken against; the scenario's own unless another was given.
-    difference, difference_low, difference_high : ndarray, shape (3 + n, R)
-        P(r) - P(reference), paired.
-    slope, slope_low, slope_high : ndarray, shape (3 + n, R - 1)
-        The gain per unit of radius between neighbouring radii, paired.
-    kind, defender : ndarray of int8 and int32, shape (R, M)
-        Every outcome, as in `tadcore.Batch`.
-    level : float
-        Confidence level.
-    breakpoints : Breakpoints or None
-        The radii at which single trials change, where asked for.
-    """
-
-    player: str
-    radius: RadiusKind
-    radii: Floats
-    names: tuple[str, ...]
-    estimate: Floats
-    low: Floats
-    high: Floats
-    band_low: Floats
-    band_high: Floats
-    reference: float
-    difference: Floats
-    difference_low: Floats
-    difference_high: Floats
-    slope: Floats
-    slope_low: Floats
-    slope_high: Floats
-    kind: NDArray[np.int8]
-    defender: NDArray[np.int32]
-    level: float
-    breakpoints: Breakpoints | None
-
-    @property
-    def trials(self) -> int:
-        """M."""
-        return int(self.kind.shape[1])
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The curves over (outcome, radius), the slopes over (outcome, interval)."""
-        import xarray as xr
-
-        curves = ["estimate", "low", "high", "band_low", "band_high"]
-        curves += ["difference", "difference_low", "difference_high"]
-        slopes = ["slope", "slope_low", "slope_high"]
-        return xr.Dataset(
-            {name: (("outcome", "radius"), getattr(self, name)) for name in curves}
-            | {name: (("outcome", "interval"), getattr(self, name)) for name in slopes},
-            coords={
-                "outcome": list(self.names),
-                "radius": self.radii,
-                "interval": (self.radii[1:] + self.radii[:-1]) / 2.0,
-            },
-            attrs={
-                "player": self.player,
-                "kind": self.radius,
-                "reference": self.reference,
-                "trials": self.trials,
-                "level": self.level,
-            },
-        )
-
-    def __repr__(self) -> str:
-        i = self.names.index("intercepted")
-        low, high = self.estimate[i].min(), self.estimate[i].max()
-        return (
-            f"RadiusCurve({self.radius} of {self.player} at {len(self.radii)} radii in [{self.radii[0]:g}, "
-            f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {low:.4f} to {high:.4f})"
-        )
 
 
 def radius_curve(
@@ -214,8 +121,8 @@ def radius_curve(
     low, high = proportion_interval(count, len(rows), level=confidence)
     together = 1.0 - (1.0 - confidence) / len(grid)
     band_low, band_high = proportion_interval(count, len(rows), level=together)
-    difference = _differences(against_reference, len(rows), confidence)
-    slope = _differences(against_last, len(rows), confidence)[..., 1:] / np.diff(grid)
+    difference = paired_differences(against_reference, len(rows), confidence)
+    slope = paired_differences(against_last, len(rows), confidence)[..., 1:] / np.diff(grid)
     return RadiusCurve(
         player=games.player,
         radius=kind,
@@ -238,10 +145,3 @@ def radius_curve(
         level=confidence,
         breakpoints=breakpoints(games, grid, played, tolerance) if refine else None,
     )
-
-
-def _differences(pairs: list[tuple[Integers, Integers]], trials: int, level: float) -> Floats:
-    """Difference, low and high, shape (3, outcomes, R), from what is discordant at each of R radii."""
-    counts = np.array(pairs)  # (R, 2, outcomes)
-    first, second = counts[:, 0].T, counts[:, 1].T
-    return np.array([(first - second) / trials, *difference_interval(first, second, trials, level=level)])

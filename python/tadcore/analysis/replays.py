@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_positions, as_real, refuse_where
+from tadcore._shared.arrays import Floats, as_positions, as_real, refuse_where
 from tadcore._shared.limits import OF_FIELD
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
@@ -18,9 +18,7 @@ from tadcore.simulation.starts import Rows, rows_of
 
 if TYPE_CHECKING:
     from tadcore.statistics import TrialOutcomes
-
-Floats = NDArray[np.float64]
-RadiusKind = Literal["visibility", "capture"]
+    from tadcore.statistics.radius import RadiusKind
 
 
 def starts_of(source: Scenario | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:

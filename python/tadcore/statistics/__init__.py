@@ -1,4 +1,4 @@
-"""What the trials of a study say: probabilities, incidence, comparisons, and when to stop.
+"""What the trials of a study say: probabilities, incidence, comparisons, Sobol' indices, and when to stop.
 
 Every function takes plain arrays of outcomes, or the result of a study, and returns a small object that prints as a
 table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
@@ -8,13 +8,18 @@ from .comparison import Comparison, compare, difference_interval, paired
 from .incidence import Incidence, incidence
 from .intervals import OutcomeProbabilities, probabilities, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
+from .radius import Breakpoints, RadiusCurve
 from .sequences import HalfWidth, mixture_interval
+from .sobol import Sensitivity, sobol
 
 __all__ = [
+    "Breakpoints",
     "Comparison",
     "HalfWidth",
     "Incidence",
     "OutcomeProbabilities",
+    "RadiusCurve",
+    "Sensitivity",
     "TrialOutcomes",
     "compare",
     "difference_interval",
@@ -25,4 +30,5 @@ __all__ = [
     "paired",
     "probabilities",
     "proportion_interval",
+    "sobol",
 ]

@@ -23,15 +23,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import refuse_where
+from tadcore._shared.arrays import Floats, Integers, refuse_where
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 
 from .outcomes import (
     KINDS,
-    Floats,
-    Integers,
     TrialOutcomes,
     as_level,
     as_outcomes,

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import as_real, refuse_where
+from tadcore._shared.arrays import Floats, as_real, refuse_where
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 
-from .outcomes import KINDS, Floats, as_level, as_outcomes, outcome_names
+from .outcomes import KINDS, as_level, as_outcomes, outcome_names
 
 if TYPE_CHECKING:
     import pandas as pd

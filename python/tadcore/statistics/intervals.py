@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import as_index, refuse_where
+from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
 
-from .outcomes import Floats, Integers, as_level, outcome_counts, outcome_names
+from .outcomes import as_level, outcome_counts, outcome_names
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,15 +14,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_index, refuse_where
+from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 KINDS = tuple(kind.name.lower() for kind in OutcomeKind)
 """Names of the three kinds, at the place of their codes."""

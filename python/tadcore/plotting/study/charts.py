@@ -25,9 +25,7 @@ from tadcore.plotting.tools.style import COLUMN, symbol
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.analysis.radius import RadiusCurve
-    from tadcore.analysis.sensitivities import Sensitivity
-    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities
+    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve, Sensitivity
 
 _ROW = 0.27  # inches for each row of a chart of rows
 

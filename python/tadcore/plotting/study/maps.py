@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.outcomes import boxes, outcome_look
 from tadcore.plotting.tools.style import COLUMN, PAGE, look, symbol
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.axes import Axes
 
-    from tadcore.analysis.maps import OutcomeMap
+    from tadcore.scenario.model import Scenario
 
-_HATCHED = 240  # places along an axis from which hatches are cut; finer ones would print as noise
+_HATCHED = 240  # grid points along an axis from which hatches are cut; finer ones would print as noise
 _KINDS = ("timeout", "captured")
 
 
+class GridOutcomes(Protocol):
+    """The outcomes over a grid of one player's start; `tadcore.OutcomeMap` has them."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The game, with everyone else's start."""
+
+    @property
+    def player(self) -> str:
+        """Whose start varies."""
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """``kind``, ``defender`` and ``time`` over (y, x)."""
+
+
 def outcome_map(
-    found: OutcomeMap, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
+    found: GridOutcomes, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
 ) -> Axes:
     """Draw how, or when, the game ends by the start of one player.
 
@@ -79,16 +96,14 @@ def outcome_map(
     return ax
 
 
-def _edges(places: NDArray[np.float64], others: NDArray[np.float64]) -> tuple[float, float]:
+def _edges(places: Floats, others: Floats) -> tuple[float, float]:
     """Where the first and the last cell of an axis end; a single place is as wide as the other axis's cells."""
     spread = places if len(places) > 1 else others
     half = float(spread[1] - spread[0]) / 2.0 if len(spread) > 1 else 0.5
     return float(places[0]) - half, float(places[-1]) + half
 
 
-def _areas(
-    ax: Axes, found: OutcomeMap, x: NDArray[np.float64], y: NDArray[np.float64], extent: tuple[float, ...]
-) -> list[str]:
+def _areas(ax: Axes, found: GridOutcomes, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
     """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
     code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
@@ -112,7 +127,7 @@ def _areas(
     return [names[i] for i in there]
 
 
-def _players(ax: Axes, found: OutcomeMap, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
+def _players(ax: Axes, found: GridOutcomes, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
     sc, left, right, bottom, top = found.scenario, *extent
     labels = Labels(ax)
     sight = dict(zip(sc.constrained, sc.visibility_radii, strict=True))

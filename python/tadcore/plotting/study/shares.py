@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import above, new_axes, new_panels
 from tadcore.plotting.tools.outcomes import boxes, input_label, parts_of, stack
 from tadcore.plotting.tools.style import COLUMN
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from tadcore.statistics import TrialOutcomes
-
-Floats = NDArray[np.float64]
 
 
 def outcomes_by_input(
