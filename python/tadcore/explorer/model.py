@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.network import edges_of
 from tadcore.simulation.run import Run, simulate
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from tadcore.game.network import Edge
     from tadcore.scenario.model import Scenario
 
-Floats = NDArray[np.float64]
 
 MOST_POINTS = 400
 """No curve goes to the browser with more points than about this."""

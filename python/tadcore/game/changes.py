@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
+
 from .network import Edge, edges_of
 
 __all__ = ["Interval", "NetworkChange", "changes_of", "intervals_of"]
@@ -29,9 +31,7 @@ class Interval(NamedTuple):
     edges: tuple[Edge, ...]
 
 
-def changes_of(
-    times: NDArray[np.float64], adjacency: NDArray[np.bool_], players: Sequence[str]
-) -> tuple[NetworkChange, ...]:
+def changes_of(times: Floats, adjacency: NDArray[np.bool_], players: Sequence[str]) -> tuple[NetworkChange, ...]:
     """The initial network, then every instant at which it differs from the one before.
 
     ``adjacency`` has one row for each instant at which a network was in force; the terminal instant is not one.

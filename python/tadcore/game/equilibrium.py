@@ -20,9 +20,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import Floats, as_index
 from tadcore.errors import ScenarioError
 
 from .compiled import game_of
@@ -48,18 +47,18 @@ class Equilibrium:
         Steps the integrator accepted.
     """
 
-    def __init__(self, core: _core.Equilibrium, times: NDArray[np.float64], sc: Scenario) -> None:
+    def __init__(self, core: _core.Equilibrium, times: Floats, sc: Scenario) -> None:
         self._core = core
         self._players = sc.players
         self._dim = sc.dim
         self.times = times
         solution = core.P
         solution.flags.writeable = False
-        self.P: dict[str, NDArray[np.float64]] = dict(zip(core.groups, solution, strict=True))
+        self.P: dict[str, Floats] = dict(zip(core.groups, solution, strict=True))
         self.integrator_steps = core.steps
 
     @cached_property
-    def residual(self) -> dict[str, NDArray[np.float64]]:
+    def residual(self) -> dict[str, Floats]:
         """Relative residual of the Riccati equation at every node, shape (K + 1,), by group."""
         return dict(zip(self._core.groups, self._core.residual(), strict=True))
 
@@ -69,7 +68,7 @@ class Equilibrium:
         return max(float(values.max()) for values in self.residual.values())
 
     @cached_property
-    def feedback(self) -> dict[str, NDArray[np.float64]]:
+    def feedback(self) -> dict[str, Floats]:
         """Rows of the equilibrium feedback, shape (K + 1, N), by player label.
 
         At t_k each player's control is ``feedback[player][k] @ z``, z of shape (N, dim) with one row X_p - X_a for
@@ -78,7 +77,7 @@ class Equilibrium:
         rows = self._core.feedback()
         return {player: rows[:, i] for i, player in enumerate(self._players)}
 
-    def full(self, name: str, k: int, dim: int | None = None) -> NDArray[np.float64]:
+    def full(self, name: str, k: int, dim: int | None = None) -> Floats:
         """The paper's own matrix P(t_k) = p ⊗ I, shape (dim·N, dim·N).
 
         Parameters

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
+
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
 
@@ -32,15 +34,15 @@ class Recorded(Protocol):
         """How it ended."""
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """Instants, shape (L + 1,)."""
 
     @property
-    def position(self) -> NDArray[np.float64]:
+    def position(self) -> Floats:
         """Positions, shape (L + 1, n + 2, dim)."""
 
     @property
-    def control(self) -> NDArray[np.float64]:
+    def control(self) -> Floats:
         """Controls, shape (L + 1, n + 2, dim)."""
 
     @property
@@ -48,15 +50,15 @@ class Recorded(Protocol):
         """𝒜, shape (L + 1, m, N); the last row repeats the last network in force."""
 
     @property
-    def gains(self) -> NDArray[np.float64]:
+    def gains(self) -> Floats:
         """Rows of the feedback, shape (L + 1, m, N)."""
 
     @property
-    def theta(self) -> NDArray[np.float64]:
+    def theta(self) -> Floats:
         """Θ₁ or Θ₂, shape (L + 1,)."""
 
     @property
-    def theta_terms(self) -> NDArray[np.float64]:
+    def theta_terms(self) -> Floats:
         """Its terms, unweighted, shape (L + 1, 4 or 3)."""
 
     @property

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import as_adjacency, as_index
+from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
 
 from .compiled import game_of
@@ -71,8 +71,8 @@ class Gains:
     """
 
     players: tuple[str, ...]
-    rows: NDArray[np.float64]
-    K: dict[str, NDArray[np.float64]]
+    rows: Floats
+    K: dict[str, Floats]
     theta: float
     terms: dict[str, float]
     weights: dict[str, float]

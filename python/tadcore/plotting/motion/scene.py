@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.run.network import draw_graph
 from tadcore.plotting.run.paths import disc
 from tadcore.plotting.tools.inset import filled
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from .animation import Frame
 
-Floats = NDArray[np.float64]
 
 _RECENT = 0.15  # of the game: how long a trail stays strong
 _HEIGHT = 0.58  # of the width

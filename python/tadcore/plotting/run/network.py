@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import new_panels
 from tadcore.plotting.tools.style import look, note
 
@@ -96,7 +97,7 @@ def network(
     return axes
 
 
-def _places(names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def _places(names: Sequence[str]) -> dict[str, Floats]:
     """Return where each player stands on the unit circle, clockwise: attacker, target, dn … d1."""
     around = ["attacker", "target", *reversed(names[:-2])]
     half = np.pi / len(around)
@@ -137,8 +138,8 @@ def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge],
 
 def _arrow(
     ax: Axes,
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
+    start: Floats,
+    end: Floats,
     node: float,
     *,
     bend: float,
@@ -150,7 +151,7 @@ def _arrow(
     turn = np.arctan(2 * bend)
     unit = run / length
 
-    def rotated(v: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    def rotated(v: Floats, angle: float) -> Floats:
         c, s = np.cos(angle), np.sin(angle)
         return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1]])
 

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import above
 from tadcore.plotting.tools.style import look
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from tadcore.game.recorded import Recorded
 
-Floats = NDArray[np.float64]
 
 LAID_UNDER: Any = (0, (4, 2))
 """Dashes of a run laid under another."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, note
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from tadcore.game.recorded import Recorded
 
-Floats = NDArray[np.float64]
 
 MAX_VERTICALS = 40
 """A run whose network changes more often than this gets thin curves, and ticks instead of full-height verticals."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from tadcore.game.recorded import Recorded
 
-Floats = NDArray[np.float64]
 
 MAX_EDGE_LABELS = 12
 """A run with more network changes than this has only the first change of each edge labelled."""

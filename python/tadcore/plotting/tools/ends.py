@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.text import Annotation, Text
-from numpy.typing import NDArray
+
+from tadcore._shared.arrays import Floats
 
 from .style import points
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
-Floats = NDArray[np.float64]
 
 _LEFT = 9.0  # points from the frame to a name
 _APART = 1.0  # points between two names

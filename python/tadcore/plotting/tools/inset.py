@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
+
+from tadcore._shared.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 _TOUCHING = 7.0  # points between two end markers that touch
 _CROWD = 3  # so many touching pairs make a crowd

@@ -21,13 +21,14 @@ from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
 from numpy.typing import ArrayLike, NDArray
 
+from tadcore._shared.arrays import Floats
+
 from .style import points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
-Floats = NDArray[np.float64]
 
 _ANGLES = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 _GAPS = np.array([3.5, 7.0, 11.0, 16.0, 22.0, 30.0, 40.0, 52.0, 66.0])  # points between a label and what it names

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
+
+from tadcore._shared.arrays import Floats
 
 from .style import look, symbol
 
@@ -63,7 +63,7 @@ def boxes(names: Sequence[str]) -> list[Patch]:
     return [Patch(facecolor=it.fill, edgecolor="0.25", hatch=it.hatch, linewidth=0.5, label=it.label) for it in looks]
 
 
-def stack(ax: Axes, x: NDArray[np.float64], base: NDArray[np.float64], top: NDArray[np.float64], name: str) -> None:
+def stack(ax: Axes, x: Floats, base: Floats, top: Floats, name: str) -> None:
     """Fill one outcome's layer of a stack of steps, and draw its upper rim."""
     it = outcome_look(name)
     ax.fill_between(x, base, top, step="post", facecolor=it.fill, hatch=it.hatch, edgecolor="0.35", linewidth=0.0)

@@ -30,11 +30,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import as_adjacency, as_index
+from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
-from tadcore.verification.oracle.matrices import Floats, matrices_of
+from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 
 from .relaxation import Form, solve

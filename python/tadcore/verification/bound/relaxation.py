@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse.csgraph import connected_components
 
-from tadcore.verification.oracle.matrices import Floats
+from tadcore._shared.arrays import Floats
 from tadcore.verification.oracle.objective import FullObjective
 
 _POLISH = 12

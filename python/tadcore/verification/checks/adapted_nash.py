@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.simulation.run import simulate
 from tadcore.verification.oracle.adapted import Adapted
-from tadcore.verification.oracle.matrices import FeedbackSolution, Floats
+from tadcore.verification.oracle.matrices import FeedbackSolution
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
 if TYPE_CHECKING:

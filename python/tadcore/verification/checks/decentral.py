@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_adjacency, as_index
+from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
-from tadcore.verification.oracle.matrices import Floats, Matrices, matrices_of
+from tadcore.verification.oracle.matrices import Matrices, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.report import Check, Measurement, VerificationReport
 

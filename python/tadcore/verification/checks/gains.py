@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
 from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_clarabel
-from tadcore.verification.oracle.matrices import FeedbackSolution, Floats, matrices_of
+from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.report import Check, Measurement, VerificationReport
 

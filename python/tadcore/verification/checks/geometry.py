@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.simulation.run import simulate
-from tadcore.verification.oracle.matrices import Floats
 from tadcore.verification.report import Check, VerificationReport
 
 if TYPE_CHECKING:

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.verification.oracle.flow import riccati_within
-from tadcore.verification.oracle.matrices import FeedbackSolution, Floats, matrices_of, stacked_rows
+from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, stacked_rows
 from tadcore.verification.oracle.responses import REGRET, best_responses, is_smooth
 from tadcore.verification.report import Check, Measurement, VerificationReport
 

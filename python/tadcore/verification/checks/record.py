@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.indices import adapted_weights, theta_terms
-from tadcore.verification.oracle.matrices import FeedbackSolution, Floats, stacked_rows
+from tadcore.verification.oracle.matrices import FeedbackSolution, stacked_rows
 from tadcore.verification.report import Check, VerificationReport
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
-from tadcore.verification.oracle.matrices import Floats, matrices_of
+from tadcore.verification.oracle.matrices import matrices_of
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
-from tadcore.verification.oracle.matrices import Floats
 
 from .circles import Circles, Loops, flow
 from .plays import Event, EventPlay, Slide

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.network import Edge
 from tadcore.game.outcome import Outcome
-from tadcore.verification.oracle.matrices import Floats
 
 __all__ = ["Event", "EventPlay", "Slide"]
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.simulation.run import simulate
 from tadcore.verification.checks.steps import refined
-from tadcore.verification.oracle.matrices import Floats
 
 from .events import play_by_events
 

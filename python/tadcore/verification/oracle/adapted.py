@@ -29,12 +29,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
 
 from .flow import integral, propagate, riccati_within
 from .indices import AdaptedWeights, adapted_weights, integrands
-from .matrices import FeedbackSolution, Floats, Matrices, matrices_of
+from .matrices import FeedbackSolution, Matrices, matrices_of
 
 if TYPE_CHECKING:
     from tadcore.simulation.run import Run

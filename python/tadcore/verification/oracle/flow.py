@@ -12,7 +12,9 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .matrices import Floats, Matrices
+from tadcore._shared.arrays import Floats
+
+from .matrices import Matrices
 
 NODES = 5
 """Gauss nodes in a step: order 10."""

@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .matrices import Floats, Matrices
+from tadcore._shared.arrays import Floats
+
+from .matrices import Matrices
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario

@@ -19,12 +19,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from tadcore._shared.arrays import Floats
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
-
-Floats = NDArray[np.float64]
 
 
 class FeedbackSolution(Protocol):

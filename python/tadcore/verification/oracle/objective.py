@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .matrices import Floats, Matrices
+from tadcore._shared.arrays import Floats
+
+from .matrices import Matrices
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario

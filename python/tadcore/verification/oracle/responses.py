@@ -23,8 +23,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
+from tadcore._shared.arrays import Floats
+
 from .flow import TooStiffError
-from .matrices import Floats, Matrices, matrices_of
+from .matrices import Matrices, matrices_of
 
 if TYPE_CHECKING:
     from tadcore.scenario.model import Scenario
