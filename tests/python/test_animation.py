@@ -14,7 +14,7 @@ from tadcore import plotting
 from tadcore.plotting.motion.scene import Scene
 from tadcore.plotting.run.network import _NEW
 
-FRAMES_IN_A_BEAT = 4  # 0.4 s at 10 pictures a second
+FRAMES_IN_A_PAUSE = 4  # 0.4 s at 10 pictures a second
 
 
 @pytest.fixture(scope="module")
@@ -26,12 +26,12 @@ def lines_by_marker(figure):
     return {line.get_marker(): line for line in figure.axes[0].lines if line.get_marker() not in ("None", "", None)}
 
 
-def test_frames_rest_on_every_change_and_on_the_end(run):
+def test_frames_pause_at_every_change_and_on_the_end(run):
     animation = run.animate(seconds=2.0, fps=10)
-    beats = [frame.k for frame in animation.frames if frame.beat]
+    pauses = [frame.k for frame in animation.frames if frame.pause]
     when = [change.time for change in run.network_changes[1:]]
-    assert run.times[beats[::FRAMES_IN_A_BEAT]] == pytest.approx(when)
-    assert len(beats) == FRAMES_IN_A_BEAT * len(when)
+    assert run.times[pauses[::FRAMES_IN_A_PAUSE]] == pytest.approx(when)
+    assert len(pauses) == FRAMES_IN_A_PAUSE * len(when)
     over = [frame for frame in animation.frames if frame.over]
     assert len(over) == 16
     assert animation.frames[-1].k == len(run.times) - 1
@@ -52,7 +52,7 @@ def test_a_restless_network_does_not_stop_the_clock():
 def test_a_frame_shows_where_everyone_is(run):
     scene = Scene(run, 5.0)
     animation = run.animate(seconds=1.0, fps=10)
-    for frame in (animation.frames[0], next(f for f in animation.frames if f.beat), animation.frames[-1]):
+    for frame in (animation.frames[0], next(f for f in animation.frames if f.pause), animation.frames[-1]):
         scene.show(frame)
         markers = lines_by_marker(scene.figure)
         assert len(markers) == 5
@@ -61,7 +61,7 @@ def test_a_frame_shows_where_everyone_is(run):
         texts = [text.get_text() for text in scene.figure.texts]
         assert texts[0] == f"t = {run.times[frame.k]:.3f}"
         thick = [p for p in scene.figure.axes[1].patches if p.get_linewidth() == _NEW["linewidth"]]
-        assert len(thick) == (1 if frame.beat else 0)
+        assert len(thick) == (1 if frame.pause else 0)
     assert texts[1] == "$d_{1}$ intercepts $a$ at $t=1.395$"
     scene.show(animation.frames[-1])
     assert scene.figure.texts[1].get_text() == texts[1], "the end stays on the screen"

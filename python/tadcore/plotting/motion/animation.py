@@ -5,13 +5,13 @@ from __future__ import annotations
 import base64
 import os
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
 import numpy as np
 
+from .frames import frames_of
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -20,32 +20,7 @@ if TYPE_CHECKING:
 
     from tadcore.game.recorded import Recorded
 
-_BEAT = 0.4  # seconds for which the picture rests where the network changes
-_BEATS = 4.0  # seconds of rest in all; a restless network gets shorter beats, at last none
-_END = 1.6  # seconds for which the end stands
 _SUFFIXES = (".gif", ".mp4", ".html")
-
-
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """What one picture shows: the instant of that index, and whether the picture rests on a change or on the end."""
-
-    k: int
-    beat: bool = False
-    over: bool = False
-
-
-def frames_of(run: Recorded, seconds: float, fps: float) -> list[Frame]:
-    """Return the frames: equal steps of time, a rest at every network change, a rest at the end."""
-    last = len(run.times) - 1
-    count = max(round(seconds * fps), 2)
-    shown = {int(k) for k in np.linspace(0, last, count).round()}
-    changes = [int(np.argmin(np.abs(run.times - change.time))) for change in run.network_changes[1:]]
-    rest = int(min(_BEAT, _BEATS / max(len(changes), 1)) * fps)
-    frames: list[Frame] = []
-    for k in sorted(shown | (set(changes) if rest else set())):
-        frames += [Frame(k, beat=True)] * rest if k in changes and rest else [Frame(k)]
-    return frames + [Frame(last, over=True)] * max(round(_END * fps), 1)
 
 
 class Animation:
@@ -74,7 +49,7 @@ class Animation:
 
     @property
     def duration(self) -> float:
-        """Length in seconds, rests included."""
+        """Length in seconds, pauses included."""
         return len(self.frames) / self.fps
 
     def figure(self, index: int = -1) -> Figure:

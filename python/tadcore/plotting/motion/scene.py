@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from tadcore.game.recorded import Recorded
 
-    from .animation import Frame
+    from .frames import Frame
 
 
 _RECENT = 0.15  # of the game: how long a trail stays strong
@@ -69,7 +69,7 @@ class Scene:
             else:
                 name.xy = tuple(path[-1])
         self._clock.set_text(f"t = {self._run.times[k]:.3f}")
-        self._show_network(k, beat=frame.beat)
+        self._show_network(k, pause=frame.pause)
         if frame.over:
             self._event.set_text(outcome_text(self._run))
             if not self._over:
@@ -88,21 +88,21 @@ class Scene:
             ring[((ring[:, :2] < low) | (ring[:, :2] > high)).any(axis=1)] = np.nan
         _set(mover["sight"], ring)
 
-    def _show_network(self, k: int, *, beat: bool) -> None:
-        """Draw the graph in force at t_k; during a beat also what is new, in the arena and above it."""
+    def _show_network(self, k: int, *, pause: bool) -> None:
+        """Draw the graph in force at t_k; during a pause also what is new, in the arena and above it."""
         if not self._starts:
             self._graph.set_axis_off()
             return
         now = min(int(np.searchsorted(self._starts, k, side="right")) - 1, len(self._edges) - 1)
         change = self._run.network_changes[now]
-        new, lost = (set(change.added), set(change.removed)) if beat and now else (set(), set())
+        new, lost = (set(change.added), set(change.removed)) if pause and now else (set(), set())
         for line in self._seen:
             line.remove()
         self._seen = [self._sight_line(k, *edge) for edge in sorted(new)]
         texts = [edge_text(p, [q]) for p, q in sorted(new)] + [edge_text(p, [q], lost=True) for p, q in sorted(lost)]
         self._event.set_text(",  ".join(texts[:4]) + (" …" if len(texts) > 4 else ""))
-        if (now, beat) != self._network:
-            self._network = (now, beat)
+        if (now, pause) != self._network:
+            self._network = (now, pause)
             self._graph.clear()
             draw_graph(self._graph, self._run.scenario.players, self._edges[now], new, lost)
             self._graph.set_title("who sees whom")
