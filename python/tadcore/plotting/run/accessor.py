@@ -1,89 +1,47 @@
-"""The figures of a run as methods; `tadcore.plotting` draws them, and is imported when one is asked for."""
+"""The figures of a run as methods."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
+
+from .gains import gains
+from .network import network
+from .raster import visibility
+from .series import controls, distances, theta
+from .trajectories import trajectories
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
     from tadcore.game.recorded import Recorded
+
+P = ParamSpec("P")
+Drawn = TypeVar("Drawn")
+
+
+def method(draw: Callable[Concatenate[Recorded, P], Drawn]) -> Callable[Concatenate[Plots, P], Drawn]:
+    """Make a method of a figure: its first argument is the run."""
+
+    @wraps(draw)
+    def on_run(self: Plots, /, *args: P.args, **options: P.kwargs) -> Drawn:
+        return draw(self.run, *args, **options)
+
+    return on_run
 
 
 class Plots:
-    """Figures of one run; every method is the function of that name in `tadcore.plotting`, which says more."""
+    """Figures of one run; every method is the function of that name in `tadcore.plotting`."""
 
     def __init__(self, run: Recorded) -> None:
-        self._run = run
+        self.run = run
 
-    def trajectories(
-        self,
-        ax: Axes | None = None,
-        *,
-        full: Recorded | None = None,
-        names: tuple[str, str] = ("limited observations", "full observation"),
-        edge_markers: bool = True,
-        capture_discs: bool = True,
-        title: bool = True,
-        zoom: bool = True,
-    ) -> Axes:
-        """Paths in the plane or in space, with capture discs and a mark where an edge forms."""
-        from tadcore.plotting import trajectories
-
-        return trajectories(
-            self._run,
-            ax,
-            full=full,
-            names=names,
-            edge_markers=edge_markers,
-            capture_discs=capture_discs,
-            title=title,
-            zoom=zoom,
-        )
-
-    def network(
-        self, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
-    ) -> Axes | NDArray[Any]:
-        """The visibility graph, one panel for each interval, the new edge emphasised."""
-        from tadcore.plotting import network
-
-        return network(self._run, axes, max_panels=max_panels, columns=columns)
-
-    def controls(
-        self, axis: str = "x", *, players: Sequence[str] | None = None, ax: Axes | None = None, changes: bool = True
-    ) -> Axes:
-        """Controls along one axis, with dashed verticals at network changes."""
-        from tadcore.plotting import controls
-
-        return controls(self._run, axis, players=players, ax=ax, changes=changes)
-
-    def distances(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
-        """Distances to the attacker, with capture and visibility radii."""
-        from tadcore.plotting import distances
-
-        return distances(self._run, ax=ax, changes=changes)
-
-    def visibility(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
-        """A raster of who sees whom, edge by time."""
-        from tadcore.plotting import visibility
-
-        return visibility(self._run, ax=ax, changes=changes)
-
-    def gains(
-        self, axes: Axes | NDArray[Any] | None = None, *, columns: int = 1, changes: bool = True
-    ) -> Axes | NDArray[Any]:
-        """The rows of the feedback over time, one panel for each player with limited sight."""
-        from tadcore.plotting import gains
-
-        return gains(self._run, axes, columns=columns, changes=changes)
-
-    def theta(self, *, ax: Axes | None = None, changes: bool = True) -> Axes:
-        """The synthesis objective and the terms that make it up."""
-        from tadcore.plotting import theta
-
-        return theta(self._run, ax=ax, changes=changes)
+    trajectories = method(trajectories)
+    network = method(network)
+    controls = method(controls)
+    distances = method(distances)
+    visibility = method(visibility)
+    gains = method(gains)
+    theta = method(theta)
 
     def __repr__(self) -> str:
-        return ", ".join(f"{name}()" for name in vars(type(self)) if not name.startswith("_"))
+        return ", ".join(f"{name}()" for name, value in vars(type(self)).items() if hasattr(value, "__wrapped__"))
