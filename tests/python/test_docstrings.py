@@ -17,7 +17,7 @@ MODULES += [
     ".analysis.maps",
 ]
 MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
-MODULES += [".verification", ".verification.continuous.events"]
+MODULES += [".verification.every_check", ".verification.continuous.events"]
 
 
 @pytest.mark.parametrize("name", MODULES)
