@@ -47,20 +47,14 @@ class _Ends(Artist):
 def spread(wanted: Floats, heights: Floats, low: float, high: float) -> Floats:
     """Return centres as near to ``wanted`` as boxes of these heights can be without touching, within the range.
 
-    Subtracting the room that the boxes below take turns "boxes do not touch" into "values do not decrease", so the
-    nearest centres in least squares are an isotonic regression: neighbours out of order are pooled at their mean.
+    Subtracting the heights of the boxes below turns "boxes do not touch" into "values do not decrease", so the
+    nearest centres in least squares are an isotonic regression.
     """
+    from scipy.optimize import isotonic_regression
+
     order = np.argsort(wanted, kind="stable")
     below = np.cumsum(heights[order]) - heights[order] / 2
-    pools: list[tuple[float, int]] = []
-    for value in wanted[order] - below:
-        mean, count = float(value), 1
-        while pools and pools[-1][0] > mean:
-            other, members = pools.pop()
-            mean = (mean * count + other * members) / (count + members)
-            count += members
-        pools.append((mean, count))
-    shifted = np.repeat([mean for mean, _ in pools], [count for _, count in pools])
+    shifted = isotonic_regression(wanted[order] - below).x
     placed = np.empty(len(wanted))
     placed[order] = np.clip(shifted, low, max(high - float(heights.sum()), low)) + below
     return placed
