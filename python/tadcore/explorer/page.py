@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Callable
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,7 +84,8 @@ class Page:
         try:
             action()
         except TadcoreError as error:
-            self.status.text = f'<span style="color:#B00020">{_escaped(str(error))}</span>'
+            lines = escape(str(error), quote=False).replace("\n", "<br>")
+            self.status.text = f'<span style="color:#B00020">{lines}</span>'
             return False
         self.play()
         self.show_instant()
@@ -114,7 +116,7 @@ class Page:
         self.sources["theta"].data = {"t": times, "theta": run.theta[at].tolist()}
         self._trace()
         said = f" (a preview in steps of {run.scenario.step:g})" if explorer.preview else ""
-        self.status.text = f"<b>{_escaped(str(run.outcome))}</b>{said}"
+        self.status.text = f"<b>{escape(str(run.outcome))}</b>{said}"
         self._quiet = True
         self.time.end = run.outcome.time or explorer.scenario.step
         self.time.value = explorer.time
@@ -288,7 +290,3 @@ class Page:
 
 def _discs(players: list[str], centres: list[list[float]], radii: list[float]) -> dict[str, list[Any]]:
     return {"player": players, "x": [c[0] for c in centres], "y": [c[1] for c in centres], "r": radii}
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace("\n", "<br>")
