@@ -7,6 +7,8 @@ import re
 import stat
 import tempfile
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -83,20 +85,23 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         raise ScenarioError(f"{name}, line {line}", found, f"valid TOML ({reason})") from None
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes, *, durable: bool = False) -> None:
-    """Write beside the destination, then rename onto it, so that no reader meets half a file.
+@contextmanager
+def written(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
+    """A file beside the destination to write to; it takes that name if the block succeeds and is removed if not.
 
-    With ``durable`` it returns when the bytes and the name are on the disk, safe from a loss of power.
+    So no reader meets half a file. Its suffix is the destination's, by which some writers choose a format. With
+    ``durable`` bytes and name are on the disk at the end, safe from a loss of power.
     """
     destination = Path(path)
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    descriptor, name = tempfile.mkstemp(prefix=f".{destination.name}.", dir=destination.parent)
+    descriptor, name = tempfile.mkstemp(
+        prefix=f".{destination.name}.", suffix=destination.suffix.lower(), dir=destination.parent
+    )
+    os.close(descriptor)
     partial = Path(name)
     try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(data)
-            if durable:
-                stream.flush()
+        yield partial
+        if durable:
+            with partial.open("rb+") as stream:
                 os.fsync(stream.fileno())
         partial.chmod(0o666 & ~_umask())
         partial.replace(destination)
@@ -105,6 +110,12 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, durable: 
         raise
     if durable:
         _sync_folder(destination.parent)
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes, *, durable: bool = False) -> None:
+    """Write a file that appears whole or not at all; see `written`."""
+    with written(path, durable=durable) as partial:
+        partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -7,9 +7,10 @@ import os
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
-from uuid import uuid4
 
 import numpy as np
+
+from tadcore._shared.files import written
 
 from .frames import frames_of
 from .scene import Scene
@@ -84,12 +85,8 @@ class Animation:
         target = Path(path)
         writer = self._writer(target.suffix.lower())
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{uuid4().hex}{target.suffix.lower()}")
-        try:
-            self._draw(writer, temporary, dpi)
-            temporary.replace(target)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with written(target) as partial:
+            self._draw(writer, partial, dpi)
         return target
 
     def to_jshtml(self, *, dpi: float = 80.0) -> str:

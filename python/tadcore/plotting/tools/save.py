@@ -7,9 +7,10 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 import matplotlib as mpl
+
+from tadcore._shared.files import written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,18 +55,14 @@ def save(
         settings |= {"pgf.texsystem": _engine(), "pgf.preamble": r"\usepackage{amssymb}", "pgf.rcfonts": False}
     base = Path(stem)
     base.parent.mkdir(parents=True, exist_ok=True)
-    written = []
+    files = []
     with mpl.rc_context(settings):
         for kind in formats:
             target = base.with_name(f"{base.name}.{kind}")
-            temporary = base.with_name(f".{base.name}-{uuid4().hex}.{kind}")
-            try:
-                fig.savefig(temporary, format=kind, dpi=dpi, **_UNDATED.get(kind, {}))
-                temporary.replace(target)
-            finally:
-                temporary.unlink(missing_ok=True)
-            written.append(target)
-    return written
+            with written(target) as partial:
+                fig.savefig(partial, format=kind, dpi=dpi, **_UNDATED.get(kind, {}))
+            files.append(target)
+    return files
 
 
 def _engine() -> str:
