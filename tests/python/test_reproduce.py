@@ -158,7 +158,7 @@ def test_an_output_that_is_a_file_is_refused_before_anything_runs(tmp_path):
 
 
 def test_a_failure_half_way_leaves_no_trace(tmp_path, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise RuntimeError("no ink")
 
     monkeypatch.setattr(module, "_draw", broken)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import as_index
-from tadcore.cli.terminal import bar
+from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.paths import label

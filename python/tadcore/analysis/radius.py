@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore.cli.terminal import bar
+from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.statistics import outcome_names, proportion_interval
 from tadcore.statistics.comparison import discordant

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-Item = TypeVar("Item")
 
 
 def say(text: str, *, indent: int = 0) -> None:
@@ -19,14 +16,6 @@ def say(text: str, *, indent: int = 0) -> None:
 def complain(text: str) -> None:
     """Print an error to standard error."""
     _print(_console(stderr=True), f"error: {text}", 0)
-
-
-def bar(items: Sequence[Item], what: str, *, show: bool) -> Iterable[Item]:
-    """The items one by one, with a progress bar where one is wanted and standard error is a terminal."""
-    from tqdm.auto import tqdm
-
-    progress: Iterable[Item] = tqdm(items, desc=what, disable=None if show else True)  # None: quiet in a pipe
-    return progress
 
 
 def _console(*, stderr: bool) -> Console:

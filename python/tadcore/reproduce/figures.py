@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Runs = Mapping[str, "Run"]
 
-__all__ = ["FIGURES", "draw", "first_edge"]
+__all__ = ["FIGURES", "first_edge"]
 
 
 def first_edge(run: Run, observer: str, seen: str | None = None) -> float | None:
@@ -93,10 +93,4 @@ FIGURES: dict[str, Callable[[Runs], Figure]] = {
     "fig-i2-network": _panels("paper-i2"),
     "fig-i2-controls": _i2_controls,
 }
-"""How to make each figure, by file name, from the runs of the bundled scenarios by name."""
-
-
-def draw(runs: Runs) -> Iterator[tuple[str, Figure]]:
-    """Make every figure of section VI in turn; draw and save each inside `tadcore.plotting.style`."""
-    for name, make in FIGURES.items():
-        yield name, make(runs)
+"""How to make each figure, by file name, from runs by scenario; to be drawn and saved in `tadcore.plotting.style`."""

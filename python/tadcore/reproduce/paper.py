@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore import _core, scenarios
+from tadcore._shared.progress import bar
 from tadcore.simulation.run import simulate
 
 from .comparison import Report, Row
@@ -26,7 +27,6 @@ from .published import PUBLISHED, Published
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress
 
     from tadcore.simulation.run import Run
 
@@ -57,28 +57,26 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
         the winners of I2, and what the text states of both.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
     from rich.text import Text
 
     target = Path(out)
     if target.exists() and not target.is_dir():
         raise NotADirectoryError(f"the output folder {str(target)!r} is a file")
     console = console or Console()
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=None), MofNCompleteColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        runs = _play(progress)
-        report = Report(rows=compare(runs), version=_core.__version__)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-        try:
-            (draft / "report.md").write_text(report.to_markdown(), encoding="utf-8")
-            text = json.dumps(report.to_dict(), indent=2, ensure_ascii=False)
-            (draft / "report.json").write_text(text + "\n", encoding="utf-8")
-            if figures:
-                _draw(runs, draft, progress)
-            files = _move(draft, target)
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
+    watched = console.is_terminal
+    runs = {case.scenario: simulate(scenarios.load(case.scenario)) for case in bar(PUBLISHED, "runs", show=watched)}
+    report = Report(rows=compare(runs), version=_core.__version__)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        (draft / "report.md").write_text(report.to_markdown(), encoding="utf-8")
+        text = json.dumps(report.to_dict(), indent=2, ensure_ascii=False)
+        (draft / "report.json").write_text(text + "\n", encoding="utf-8")
+        if figures:
+            _draw(runs, draft, show=watched)
+        files = _move(draft, target)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
     report = Report(rows=report.rows, version=report.version, files=tuple(files))
     report.print(console)
     pictures = sum(file.suffix == ".png" for file in files)
@@ -93,15 +91,6 @@ def compare(runs: Mapping[str, Run]) -> tuple[Row, ...]:
         rows += _figures_of(case, runs[case.scenario])
         rows += _statements(case, runs)
     return tuple(rows)
-
-
-def _play(progress: Progress) -> dict[str, Run]:
-    task = progress.add_task("runs", total=len(PUBLISHED))
-    runs = {}
-    for case in PUBLISHED:
-        runs[case.scenario] = simulate(scenarios.load(case.scenario))
-        progress.advance(task)
-    return runs
 
 
 def _figures_of(case: Published, run: Run) -> Iterator[Row]:
@@ -176,16 +165,14 @@ def _off_line(run: Run) -> float:
     return float(np.abs(apart - (apart @ along)[..., None] * along).max())
 
 
-def _draw(runs: Mapping[str, Run], folder: Path, progress: Progress) -> None:
+def _draw(runs: Mapping[str, Run], folder: Path, *, show: bool) -> None:
     from tadcore.plotting import save, style
 
-    from .figures import FIGURES, draw
+    from .figures import FIGURES
 
-    task = progress.add_task("figures", total=len(FIGURES))
     with style():
-        for name, figure in draw(runs):
-            save(figure, folder / name)
-            progress.advance(task)
+        for name in bar(list(FIGURES), "figures", show=show):
+            save(FIGURES[name](runs), folder / name)
 
 
 def _move(draft: Path, target: Path) -> list[Path]:

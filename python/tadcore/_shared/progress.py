@@ -1,0 +1,16 @@
+"""The progress bar of everything that takes long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+
+def bar(items: Sequence[Item], what: str, *, show: bool) -> Iterable[Item]:
+    """The items one by one, with a progress bar where one is wanted and standard error is a terminal."""
+    from tqdm.auto import tqdm
+
+    progress: Iterable[Item] = tqdm(items, desc=what, disable=None if show else True)  # None: quiet in a pipe
+    return progress
