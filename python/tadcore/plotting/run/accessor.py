@@ -1,47 +1,51 @@
-"""The figures of a run as methods."""
+"""The figures of a run as methods; a figure's module, and Matplotlib with it, is loaded when one is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
-from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
+from types import MethodType
+from typing import TYPE_CHECKING, Any
 
-from .gains import gains
-from .network import network
-from .raster import visibility
-from .series import controls, distances, theta
-from .trajectories import trajectories
+from tadcore import plotting
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Concatenate, ParamSpec, TypeVar
+
     from tadcore.game.recorded import Recorded
 
-P = ParamSpec("P")
-Drawn = TypeVar("Drawn")
+    P = ParamSpec("P")
+    Drawn = TypeVar("Drawn")
+
+    def method(draw: Callable[Concatenate[Recorded, P], Drawn]) -> Callable[Concatenate[Plots, P], Drawn]:
+        """Type a figure's function as a method: its first argument is the run."""
 
 
-def method(draw: Callable[Concatenate[Recorded, P], Drawn]) -> Callable[Concatenate[Plots, P], Drawn]:
-    """Make a method of a figure: its first argument is the run."""
-
-    @wraps(draw)
-    def on_run(self: Plots, /, *args: P.args, **options: P.kwargs) -> Drawn:
-        return draw(self.run, *args, **options)
-
-    return on_run
+FIGURES = ("trajectories", "network", "controls", "distances", "visibility", "gains", "theta")
 
 
 class Plots:
     """Figures of one run; every method is the function of that name in `tadcore.plotting`."""
 
     def __init__(self, run: Recorded) -> None:
-        self.run = run
+        self._run = run
 
-    trajectories = method(trajectories)
-    network = method(network)
-    controls = method(controls)
-    distances = method(distances)
-    visibility = method(visibility)
-    gains = method(gains)
-    theta = method(theta)
+    if TYPE_CHECKING:
+        trajectories = method(plotting.trajectories)
+        network = method(plotting.network)
+        controls = method(plotting.controls)
+        distances = method(plotting.distances)
+        visibility = method(plotting.visibility)
+        gains = method(plotting.gains)
+        theta = method(plotting.theta)
+    else:
+
+        def __getattr__(self, name: str) -> Any:
+            if name not in FIGURES:
+                raise AttributeError(f"no figure {name!r}; one of {', '.join(FIGURES)}", name=name, obj=self)
+            return MethodType(getattr(plotting, name), self._run)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *FIGURES]
 
     def __repr__(self) -> str:
-        return ", ".join(f"{name}()" for name, value in vars(type(self)).items() if hasattr(value, "__wrapped__"))
+        return ", ".join(f"{name}()" for name in FIGURES)
