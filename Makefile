@@ -120,7 +120,8 @@ peers: setup  ## compare with the same work in SciPy, Numba and JAX, one process
 	for script in benches/peers/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
 images: setup  ## redraw the reference images of the tests, and labelled copies into out/images
-	$(BIN)/python -m pytest -q tests/python/test_images.py --mpl-generate-path=tests/python/baseline
+	$(BIN)/python -m pytest -q tests/python/plotting/test_images.py \
+	  --mpl-generate-path=tests/python/plotting/baseline
 
 docs: setup  ## build the documentation, every code cell executed, and the core's; warnings are errors
 	RUSTDOCFLAGS="$(RUSTDOC)" cargo doc --workspace --no-deps --locked

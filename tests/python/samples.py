@@ -4,9 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from oracle.model import Game, Start
+from oracle.model import Game, Start, uniform
 from oracle.riccati import equilibrium, escape_time
+from oracle.scenario import as_mapping
 from oracle.theta import full
+
+ESCAPES = {
+    "n = 1": (uniform("I2", (1.0,), 1.0, 0.8, horizon=4.0, q_atau=0.01, f_atau=0.01), 3.2197539590990143),
+    "n = 3, strong evasion": (
+        uniform("I2", (1, 1, 1), 1.2, 0.8, horizon=0.2, q_ad=(3,) * 3, f_ad=(3,) * 3, q_atau=0.1, f_atau=0.1),
+        0.11905084462320856,
+    ),
+    "n = 3, cheap attacker": (uniform("I2", (10, 10, 10), 1.2, 0.3, horizon=0.2), 0.15925099506602167),
+}
+"""Games of I2 without an equilibrium, with their escape times."""
 
 
 def random_game(rng, interaction, n, *, horizon, step=0.01, low=0.4, high=2.5, **fixed):
@@ -57,3 +68,12 @@ def random_start(rng, game, axes=2, spread=2.0, sigma=0.05):
 def full_P(game, k):
     """The paper's own matrices at t_k."""
     return full(equilibrium(game)[k])
+
+
+def scenario(game):
+    """The game as a scenario whose positions and radii play no part."""
+    positions = np.arange(2.0 * (game.n + 2)).reshape(-1, 2)
+    start = Start(positions, np.full(game.m, np.inf), np.full(game.n + 1, 0.1))
+    import tadcore
+
+    return tadcore.Scenario.model_validate(as_mapping(game, start))

@@ -16,9 +16,8 @@ from oracle.decimals import exact_P
 from oracle.model import uniform
 from oracle.riccati import equilibrium, feedback, integrate
 from oracle.scenario import as_mapping, game_of
-from samples import random_game, random_start
+from samples import ESCAPES, random_game, random_start
 from tadcore import NoEquilibriumError, ScenarioError, TadcoreError
-from test_oracle_self import ESCAPES
 
 BOTH = pytest.mark.parametrize("interaction", ["I1", "I2"])
 TIMED = ("running_weight", "target_running_weight", "evasion_running_weight")

@@ -6,16 +6,7 @@ import pytest
 from oracle import model, network, riccati, synthesis, theta
 from oracle.model import uniform
 from oracle.network import from_number, number
-from samples import full_P, random_game, random_network
-
-ESCAPES = {
-    "n = 1": (uniform("I2", (1.0,), 1.0, 0.8, horizon=4.0, q_atau=0.01, f_atau=0.01), 3.2197539590990143),
-    "n = 3, strong evasion": (
-        uniform("I2", (1, 1, 1), 1.2, 0.8, horizon=0.2, q_ad=(3,) * 3, f_ad=(3,) * 3, q_atau=0.1, f_atau=0.1),
-        0.11905084462320856,
-    ),
-    "n = 3, cheap attacker": (uniform("I2", (10, 10, 10), 1.2, 0.3, horizon=0.2), 0.15925099506602167),
-}
+from samples import ESCAPES, full_P, random_game, random_network
 
 
 def test_paper_cases_are_the_printed_ones():

@@ -7,19 +7,11 @@ import pytest
 
 import tadcore
 from oracle import riccati
-from oracle.model import Start, paper_cases
-from oracle.scenario import as_mapping, game_of
-from samples import full_P, random_game
-from test_oracle_self import ESCAPES
+from oracle.model import paper_cases
+from oracle.scenario import game_of
+from samples import ESCAPES, full_P, random_game, scenario
 
 NAMES = {"I1": ("defenders", "target", "attacker"), "I2": ("team",)}
-
-
-def scenario(game):
-    """The game as a scenario whose positions and radii play no part."""
-    positions = np.arange(2.0 * (game.n + 2)).reshape(-1, 2)
-    start = Start(positions, np.full(game.m, np.inf), np.full(game.n + 1, 0.1))
-    return tadcore.Scenario.model_validate(as_mapping(game, start))
 
 
 def relative(P, expected):

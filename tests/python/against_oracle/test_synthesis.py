@@ -10,8 +10,7 @@ from oracle.model import paper_cases
 from oracle.network import from_number, information
 from oracle.riccati import equilibrium, feedback
 from oracle.scenario import game_of
-from samples import full_P, random_game, random_network
-from test_oracle_riccati import scenario
+from samples import full_P, random_game, random_network, scenario
 
 LOWER = 1e-9
 
