@@ -82,10 +82,10 @@ def line(interaction: str, n: int, trials: int, starts: int, seed: int) -> tuple
         in_blocks = bound_theta(reduced, found.theta, blocks=True)
         counts["pairs"] += 1
         counts["not converged"] += not found.converged
-        counts["certified by the first descent"] += found.certified and found.look == "canonical"
+        counts["certified by the first descent"] += found.certified and found.start == "canonical"
         counts["certified"] += found.certified
-        counts["a further look went lower"] += found.look != "canonical"
-        counts["first or complex look"] += found.look in ("canonical", "complex")
+        counts["a further start went lower"] += found.start != "canonical"
+        counts["first or complex start"] += found.start in ("canonical", "complex")
         counts["bound tight"] += bound.tight
         counts["certified, bound not tight"] += found.certified and not bound.tight
         counts["bound in blocks tight"] += in_blocks.tight
@@ -118,8 +118,8 @@ def main() -> None:
         "certified": "certified",
         "tight": "bound tight",
         "in blocks": "bound in blocks tight",
-        "lower": "a further look went lower",
-        "complex": "first or complex look",
+        "lower": "a further start went lower",
+        "complex": "first or complex start",
     }
     head = ("pairs", *columns, "gap 50%", "gap max", "scalars", "blocks", "ms")
     print(" " * 6 + "".join(f"{name:>10}" for name in head))

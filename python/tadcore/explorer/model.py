@@ -116,7 +116,7 @@ class Explorer:
     @property
     def edges(self) -> tuple[Edge, ...]:
         """Who sees whom at the instant that is shown."""
-        if len(self.run.times) == 1:  # over before anyone looks around
+        if len(self.run.times) == 1:  # over before there is a network
             return ()
         return edges_of(self.run.adjacency[self.k], self.scenario.players)
 

@@ -51,7 +51,7 @@ class Page:
         self.planes = RadioButtonGroup(labels=list(explorer.planes), active=0, visible=len(explorer.planes) > 1)
         self.traces = RadioButtonGroup(labels=["speed", *"xyz"[: explorer.scenario.dim]], active=0)
         self._grabbed: tuple[str, str] | None = None
-        self.pointer = Pointer(self.drag, self.rest)
+        self.pointer = Pointer(self.drag, self.pause)
         self._quiet = False
         self.play()
         self.arena = arena(self.sources)
@@ -168,8 +168,8 @@ class Page:
             act = self.explorer.move if kind == "starts" else self.explorer.stretch
             self.change(lambda: act(player, round(x, 4), round(y, 4), preview=True))
 
-    def rest(self) -> None:
-        """The pointer rests: play the game itself, of which only a preview is seen."""
+    def pause(self) -> None:
+        """The pointer pauses: play the game itself, of which only a preview is seen."""
         if self.explorer.preview:
             self.change(self.explorer.settle)
 

@@ -10,18 +10,18 @@ if TYPE_CHECKING:
     from bokeh.document import Document
 
 _GATHER = 8  # milliseconds in which movements are gathered into one
-_REST = 80  # milliseconds without a movement after which the pointer rests
+_PAUSE = 80  # milliseconds without a movement that count as a pause
 
 
 class Pointer:
-    """Calls ``drag`` with where the pointer is, not with all the places where it has been, and ``rest`` when it rests.
+    """Calls ``drag`` with where the pointer is, not with all places where it has been, and ``pause`` when it pauses.
 
     A picture takes longer than a movement. Without this, movements would queue behind pictures, and the game would
     follow the pointer late.
     """
 
-    def __init__(self, drag: Callable[[float, float], None], rest: Callable[[], None]) -> None:
-        self._drag, self._rest = drag, rest
+    def __init__(self, drag: Callable[[float, float], None], pause: Callable[[], None]) -> None:
+        self._drag, self._pause = drag, pause
         self._at: tuple[float, float] | None = None
         self._waiting: Any = None
         self.document: Document | None = None
@@ -37,7 +37,7 @@ class Pointer:
         if self._at is not None:
             (x, y), self._at = self._at, None
             self._drag(x, y)
-            self._after(_REST, self._rest)
+            self._after(_PAUSE, self._pause)
 
     def _after(self, milliseconds: int, action: Callable[[], None]) -> None:
         """Do something later, instead of what was to be done later until now."""

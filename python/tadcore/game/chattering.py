@@ -1,7 +1,7 @@
 """Chattering: stretches of a run in which an edge flips at almost every instant.
 
 Where the control with an edge drives two players apart and the control without it brings them back, the edge flips at
-almost every instant: a sliding mode of the continuous game. How often it flips is a property of δ; that it slides is
+almost every instant: a sliding mode of the continuous game. The number of flips is a property of δ; that it slides is
 not. `tadcore.verification.sliding_study` compares a run with its continuous limit.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Chatter", "chatter"]
 
 _FEWEST_FLIPS = 6
-_LONGEST_REST = 5
+_LONGEST_PAUSE = 5
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def chatter(run: Recorded) -> tuple[Chatter, ...]:
         single = np.zeros(run.adjacency.shape[1:], dtype=np.bool_)
         single[i, j] = True
         (edge,) = edges_of(single, run.scenario.players)
-        for part in np.split(at, np.flatnonzero(np.diff(at) > _LONGEST_REST) + 1):
+        for part in np.split(at, np.flatnonzero(np.diff(at) > _LONGEST_PAUSE) + 1):
             if len(part) >= _FEWEST_FLIPS:
                 found.append(Chatter(edge, float(run.times[part[0]]), float(run.times[part[-1]]), len(part)))
     return tuple(sorted(found, key=lambda c: (c.start, c.edge)))

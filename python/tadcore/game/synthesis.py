@@ -66,8 +66,8 @@ class Gains:
         Relative norm of the gradient at the end.
     certified : bool
         Whether this minimum is proved to be the global one.
-    look : {"canonical", "complex", "stacked", "reversed"}
-        Which look found it: from the canonical start, or one of the further looks for a lower minimum.
+    start : {"canonical", "complex", "stacked", "reversed"}
+        Starting point of the descent that found it: the canonical one, or a further one of the search.
     """
 
     players: tuple[str, ...]
@@ -81,7 +81,7 @@ class Gains:
     status: str
     gradient_norm: float
     certified: bool
-    look: Literal["canonical", "complex", "stacked", "reversed"]
+    start: Literal["canonical", "complex", "stacked", "reversed"]
 
     def __repr__(self) -> str:
         state = f"converged in {self.iterations}" if self.converged else f"NOT converged ({self.status})"
@@ -98,7 +98,7 @@ def synthesize(
 ) -> Gains:
     """The gains at instant t_k under a given network.
 
-    They depend on the game, the instant and the network alone, not on positions and not on the way there.
+    They depend on the game, the instant and the network alone, not on positions and not on the past trajectory.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def synthesize(
     adjacency : array_like, shape (m, N), or VisibilityNetwork
         𝒜: row i whom player i sees, entry j ≠ i the player j, entry i the attacker; 0-1 or bool.
     method : {"newton", "descent"}
-        ``"newton"``: the exact Hessian from the canonical start, with a second look in complex gains.
+        ``"newton"``: the exact Hessian from the canonical start, with a second start in complex gains.
         ``"descent"``: gradient descent with the gradients printed in the paper (eq:errgradient).
     max_iterations : int, optional
         Stop after this many steps; the result then says that it has not converged.
@@ -156,5 +156,5 @@ def synthesize(
         status=core.status,
         gradient_norm=core.gradient_norm,
         certified=core.certified,
-        look=core.look,
+        start=core.look,
     )

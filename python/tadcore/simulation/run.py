@@ -109,7 +109,7 @@ class Run:
     def network_changes(self) -> tuple[NetworkChange, ...]:
         """(time, edges added, edges removed) wherever the network changes, the initial network first.
 
-        Empty for a game that is over at t = 0: termination is tested before anyone looks around.
+        Empty for a game that is over at t = 0: termination is tested before visibility.
         """
         in_force = len(self.times) - 1
         return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
@@ -142,7 +142,7 @@ class Run:
         Parameters
         ----------
         seconds : float
-            How long the game takes on the screen; rests at network changes and at the end come on top.
+            How long the game takes on the screen; pauses at network changes and at the end come on top.
         fps : float
             Pictures in a second.
         width : float

@@ -98,14 +98,14 @@ def incidence(
     level: float = 0.95,
     jointly: bool = False,
 ) -> Incidence:
-    """Estimate when each outcome comes about.
+    """Estimate the cumulative incidence of each outcome.
 
     Parameters
     ----------
     kind, defender : array_like of int, shape (M,)
         Outcomes of M independent trials, as in `tadcore.Batch`.
     time : array_like of float, shape (M,)
-        Instants of their ends, multiples of δ.
+        Termination times, multiples of δ.
     horizon, step : float
         T and δ.
     n : int

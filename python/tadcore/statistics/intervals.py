@@ -7,7 +7,7 @@ For a count s out of M independent trials the estimate of the probability p is s
 - ``"exact"``: all p that neither one-sided binomial test rejects at half of 1 - level; its coverage is never below the
   level (Clopper and Pearson 1934).
 
-Each interval holds by itself. For all outcomes at once, or for looking while trials come in, see `HalfWidth`.
+Each interval holds by itself. For all outcomes at once, or while trials come in, see `HalfWidth`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Method = Literal["wilson", "exact"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutcomeProbabilities:
-    """How likely each outcome is, and how well that is known; made by `probabilities`.
+    """Outcome probabilities with their intervals; made by `probabilities`.
 
     Attributes
     ----------

@@ -54,7 +54,7 @@ class TrialOutcomes(Protocol):
 
     @property
     def time(self) -> Floats:
-        """The instant of the end."""
+        """Termination times."""
 
     @property
     def inputs(self) -> Mapping[str, Floats]:

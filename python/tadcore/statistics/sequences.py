@@ -1,4 +1,4 @@
-r"""Intervals that stay valid however often one looks, and the rule that stops a study by them.
+r"""Intervals that hold at all numbers of trials at once, and the rule that stops a study at a given precision.
 
 An ordinary interval holds at a number of trials fixed beforehand. Looking after every chunk and stopping when it is
 narrow enough breaks its promise. A *confidence sequence* holds at all numbers of trials at once, so stopping by it at
@@ -82,7 +82,7 @@ class HalfWidth:
         ----------
         counts : mapping of str to int, or array_like of int
             How many trials ended in each outcome, as `outcome_counts` gives them; without names, in that order:
-            by `OutcomeKind`, then by defender. A study must count the same outcomes at every look.
+            by `OutcomeKind`, then by defender. A study must count the same outcomes at every evaluation.
         trials : int
             How many trials there were.
 

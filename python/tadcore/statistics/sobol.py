@@ -4,7 +4,7 @@ For a quantity Y = f(X₁, …, X_d) of independent inputs, the variance of Y sp
 their interactions. The *first-order* index :math:`S_i = \mathrm{Var}(E[Y \mid X_i]) / \mathrm{Var}(Y)` is the share
 that input i explains by itself; the *total* index
 :math:`S_{Ti} = E[\mathrm{Var}(Y \mid X_{\sim i})] / \mathrm{Var}(Y)` what it has a part in, so that an input with a
-total index of zero could be fixed anywhere (Sobol' 2001). Here Y is an outcome, as 0 or 1, or the time of the end.
+total index of zero could be fixed anywhere (Sobol' 2001). Here Y is an outcome, as 0 or 1, or the termination time.
 
 Two matrices A and B of n points each and the d matrices A with one column from B, n (d + 2) games in all, give both
 indices of every input (Saltelli et al. 2010, as computed by `scipy.stats.sobol_indices`). The points are a scrambled

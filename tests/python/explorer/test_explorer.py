@@ -64,7 +64,7 @@ def test_dragging_a_start_plays_the_game_from_there(page):
         coarse = tadcore.simulate(moved.replace({"step": 0.04}))
         assert page.status.text == f"<b>{coarse.outcome}</b> (a preview in steps of 0.04)"
         np.testing.assert_array_equal(paths_of(page)["d2"][-1], coarse.position[-1, 1])
-        page.rest()
+        page.pause()
         expected = tadcore.simulate(moved)
         assert page.status.text == f"<b>{expected.outcome}</b>"
         np.testing.assert_array_equal(paths_of(page)["d2"][-1], expected.position[-1, 1])

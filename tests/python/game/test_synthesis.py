@@ -49,7 +49,7 @@ def test_whoever_sees_everyone_plays_the_equilibrium(sc):
     feedback = tadcore.solve_equilibrium(sc).feedback
     assert gains.theta < 1e-20
     assert gains.certified
-    assert gains.look == "canonical"
+    assert gains.start == "canonical"
     for i, player in enumerate(sc.constrained):
         assert np.allclose(gains.rows[i], feedback[player][100], rtol=1e-9, atol=1e-11)
 

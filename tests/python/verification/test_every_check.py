@@ -251,7 +251,7 @@ def test_a_saddle_is_found():
 def test_rates_of_the_certificate():
     sc = tadcore.scenarios.load("paper-i2").replace(step=0.05)
     rates = v.certificate_rates(sc, trials=12, starts=1, seed=3)
-    assert rates.trials == rates.converged == rates.curved == sum(rates.looks.values()) == 12
+    assert rates.trials == rates.converged == rates.curved == sum(rates.starts.values()) == 12
     assert 0 < rates.certified < 12
     assert rates.beaten == rates.beaten_certified == 0
     assert rates == v.certificate_rates(sc, trials=12, starts=1, seed=3)

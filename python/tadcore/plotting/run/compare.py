@@ -78,7 +78,7 @@ def compare(
             width: dict[str, Any] = {"linestyle": LAID_UNDER, "linewidth": 0.9} if dashed else {}
             common: dict[str, Any] = {"color": it.colour, "zorder": 2.0 if dashed else 2.5}
             (curve,) = ax.plot(run.times, values, **common, **width)
-            # dashes say which run it is, so markers along the way say whose curve, in grey too
+            # dashes say which run it is, so markers along the way say whose curve, in greyscale too
             step = max(len(values) // 5, 1)
             curve.set(marker=it.marker, markersize=3.4, markerfacecolor="white", markeredgewidth=0.8)
             curve.set_markevery((min(step // 2 + i * step // len(shown), len(values) - 1), step))

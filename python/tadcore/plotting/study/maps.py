@@ -88,7 +88,7 @@ def outcome_map(
         image = ax.imshow(found.dataset["time"].values, origin="lower", extent=extent, cmap="cividis", zorder=1.0)
         if legend:
             bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
-            bar.figure.colorbar(image, cax=bar, label="time of the end")
+            bar.figure.colorbar(image, cax=bar, label="termination time")
     _players(ax, found, extent, radii=radii, dark=quantity == "time")
     who = symbol(found.player)
     ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
@@ -96,11 +96,11 @@ def outcome_map(
     return ax
 
 
-def _edges(places: Floats, others: Floats) -> tuple[float, float]:
+def _edges(points: Floats, others: Floats) -> tuple[float, float]:
     """Where the first and the last cell of an axis end; a single place is as wide as the other axis's cells."""
-    spread = places if len(places) > 1 else others
+    spread = points if len(points) > 1 else others
     half = float(spread[1] - spread[0]) / 2.0 if len(spread) > 1 else 0.5
-    return float(places[0]) - half, float(places[-1]) + half
+    return float(points[0]) - half, float(points[-1]) + half
 
 
 def _areas(ax: Axes, found: GridOutcomes, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
@@ -113,7 +113,7 @@ def _areas(ax: Axes, found: GridOutcomes, x: Floats, y: Floats, extent: tuple[fl
     left, right, bottom, top = extent
     ax.imshow(colours[code], origin="lower", extent=(left, right, bottom, top), interpolation="nearest", zorder=1.0)
     there = [i for i in range(len(names)) if np.any(code == i)]
-    every = [slice(None, None, -(-len(places) // _HATCHED)) for places in (y, x)]
+    every = [slice(None, None, -(-len(points) // _HATCHED)) for points in (y, x)]
     coarse = code[every[0], every[1]]
     if min(coarse.shape) > 1:
         for i in there:

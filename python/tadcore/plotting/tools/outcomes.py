@@ -1,7 +1,7 @@
 """How an outcome looks: a fill, a hatch and a line of its own, the same in every figure.
 
-Fills keep the hue of whoever brings the outcome about, at lightnesses that differ in grey; hatches tell apart what a
-grey print would still confuse.
+Fills keep the hue of whoever brings the outcome about, at lightnesses that differ in greyscale; hatches tell
+apart what a grey print would still confuse.
 """
 
 from __future__ import annotations
@@ -71,10 +71,10 @@ def stack(ax: Axes, x: Floats, base: Floats, top: Floats, name: str) -> None:
 
 
 def quantity_label(name: str) -> str:
-    """An output of a sensitivity analysis as a reader says it."""
+    """An output of a sensitivity analysis in words."""
     if name in ("timeout", "captured", "intercepted") or _is_defender(name):
         return f"“{outcome_look(name).label}”"
-    return "the time of the end" if name == "time" else name
+    return "the termination time" if name == "time" else name
 
 
 def input_label(name: str) -> str:

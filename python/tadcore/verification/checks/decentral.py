@@ -7,9 +7,8 @@ the start is the game and the clock, that is P(t).
 
 A round gives each player a turn: read the mailbox, take one step, and send the row if it moved. With ``delay`` = d a
 row sent in round s is read from round s + d on, and everyone steps on what it has: rows are then up to d rounds old.
-A player at rest tries its row
-reversed, on its own, and takes it where that ends lower: many minima differ by the sign of a row. The protocol ends in
-silence: when nobody has moved for d + 1 rounds.
+A player that no longer moves tries its row reversed, on its own, and takes it where that ends lower: many minima differ
+by the sign of a row. The protocol ends when nobody has moved for d + 1 rounds.
 """
 
 from __future__ import annotations
@@ -283,7 +282,7 @@ def check_decentral(run: Run) -> VerificationReport:
     notes = []
     for k in chosen.tolist():
         sc, network = run.scenario, run.adjacency[k]
-        if synthesize(sc, step=k, adjacency=network).look != "canonical":
+        if synthesize(sc, step=k, adjacency=network).start != "canonical":
             notes.append(f"t = {run.times[k]:.6g}: the minimum is in another basin, which no local protocol reaches")
             continue
         found = decentralise(sc, step=k, adjacency=network)

@@ -2,7 +2,7 @@
 
 Of three questions the first two have an answer. *Critical?* The gradient (eq:errgradient) at every instant. *A local
 minimum?* The Hessian with every block free, its exact smallest eigenvalue. *The global one?* Where the solver holds a
-certificate it is proved; elsewhere `multistart` looks for something lower and `theta_bound` says how much lower any
+certificate it is proved; elsewhere `multistart` searches for something lower and `theta_bound` says how much lower any
 gains could be.
 """
 
@@ -186,7 +186,7 @@ def _instants(run: Run, most: int) -> NDArray[np.int_]:
 
 @dataclass(frozen=True)
 class CertificateRates:
-    """How often each claim about optimality holds over random instants.
+    """In how many random instants each claim about optimality holds.
 
     Attributes
     ----------
@@ -202,8 +202,8 @@ class CertificateRates:
         A random start went lower.
     beaten_certified : int
         … although the minimum was certified: the proof would be wrong.
-    looks : dict of str to int
-        Which look of the solver found the minimum.
+    starts : dict of str to int
+        Starting points of the descents that found the minima.
     """
 
     trials: int
@@ -212,11 +212,11 @@ class CertificateRates:
     curved: int
     beaten: int
     beaten_certified: int
-    looks: dict[str, int]
+    starts: dict[str, int]
 
 
 def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed: int = 0) -> CertificateRates:
-    """Draw instants and networks of one game at random and count how often each claim holds.
+    """Draw instants and networks of one game at random and count the instants at which each claim holds.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
     values = m.values(solve_equilibrium(sc).P)
     shape = (len(sc.constrained), sc.n + 1)
     counts = dict.fromkeys(("converged", "certified", "curved", "beaten", "beaten_certified"), 0)
-    looks: dict[str, int] = {}
+    found_from: dict[str, int] = {}
     for trial in range(trials):
         rng = np.random.Generator(np.random.Philox(key=[seed, trial]))
         k, adjacency = int(rng.integers(sc.steps + 1)), rng.random(shape) < rng.random()
@@ -253,5 +253,5 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
         counts["curved"] += bool(low >= -_CURVATURE * high)
         counts["beaten"] += beaten
         counts["beaten_certified"] += beaten and found.certified
-        looks[found.look] = looks.get(found.look, 0) + 1
-    return CertificateRates(trials, **counts, looks=dict(sorted(looks.items())))
+        found_from[found.start] = found_from.get(found.start, 0) + 1
+    return CertificateRates(trials, **counts, starts=dict(sorted(found_from.items())))

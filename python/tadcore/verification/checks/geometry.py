@@ -1,7 +1,7 @@
 """What geometry demands: the straight line, the delay of a radius, and the symmetries of the plane and of space.
 
 Theorem straight_line (I1, λ = 0): the attacker and the target stay on the line that joins them at t = 0. Theorem
-delayproperty: two games that differ in one player's visibility radius are the same, here to the bit, until that
+delayproperty: two games that differ in one player's visibility radius are the same, here bitwise, until that
 player's first edge in either. A game that is turned, mirrored or moved is the same game, turned, mirrored or
 moved; one whose defenders are renamed, the same with other names.
 """
@@ -55,7 +55,7 @@ def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[i
     instants : int
         Instants before that player's first edge in either game.
     identical : bool
-        Whether states and controls are equal to the bit at all of them.
+        Whether states and controls are bitwise equal at all of them.
 
     Raises
     ------

@@ -78,7 +78,7 @@ class Refinement:
     changed : tuple of float
         Share of the games whose kind of ending or winner differs between one step and the next, one fewer than steps.
     moved : tuple of float
-        Largest difference of the time of the end among the others.
+        Largest difference of the termination time among the others.
     undecided : ndarray of int
         Rows of the games that changed in any refinement.
     """
@@ -162,7 +162,7 @@ def check_steps(run: Run) -> VerificationReport:
     Returns
     -------
     VerificationReport
-        Whether the same side wins by the same defender, how far the time of the end moves, and where edges chatter.
+        Whether the same side wins by the same defender, how far the termination time moves, and where edges chatter.
     """
     study = step_study(run.scenario)
     ends = {(outcome.kind, outcome.defender) for outcome in study.outcomes}

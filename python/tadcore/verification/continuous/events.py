@@ -6,7 +6,7 @@ z is exact and errors are of second order in h. Every visibility and capture cir
     f(s) = ‖w(s)‖² - ρ²,   f'(s) = 2w(s)·ẇ(s),   w = z_i - z_j or z_i,
 
 and its first root is bracketed by the signs of f at a few nodes and at the extrema between them (roots of f', so that a
-graze is not missed), then found by Brent's method. The network changes there and the rest of the step goes on with it.
+graze is not missed), then found by Brent's method. The network changes there, and the step continues with it.
 
 Where an edge would break at once after it formed and form at once after it broke, f'_on > 0 > f'_off, the game slides
 along the circle: by Filippov's rule with αC_on + (1 - α)C_off, α = f'_off / (f'_off - f'_on), until α leaves [0, 1].
@@ -169,7 +169,7 @@ class _Play:
         def slope(s: float) -> float:
             return sign * float(self.circles.slopes(at(s), C)[c])
 
-        if f(high) <= 0:  # a graze: look at the top
+        if f(high) <= 0:  # a graze: evaluate at the top
             high = brentq(slope, low, high, xtol=_ROOT)
             if f(high) <= 0:
                 return None

@@ -39,7 +39,7 @@ class FeedbackSolution(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
-    """Reduced matrices of one game; see the head of this room."""
+    """Reduced matrices of one game; see the head of this module."""
 
     parties: tuple[str, ...]
     members: tuple[slice, ...]
