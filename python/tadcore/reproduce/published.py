@@ -19,7 +19,7 @@ I2_NOTE = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Published:
     """One run of section VI as printed."""
 
@@ -27,12 +27,12 @@ class Published:
     """The name under `tadcore.scenarios`."""
     title: str
     kind: Literal["captured", "intercepted"]
-    defender: str | None
+    defender: str | None = None
     """Who intercepts."""
     time: float
-    changes: tuple[float, ...] | None
+    changes: tuple[float, ...] | None = None
     """Instants at which the visibility network changes, where the paper prints them."""
-    first_edge: tuple[str, str, float] | None
+    first_edge: tuple[str, str, float] | None = None
     """The observer, the seen player and the instant of an edge that the text singles out."""
     exact: bool
     """Whether the computed numbers must be the printed ones, to the last digit."""
@@ -44,10 +44,7 @@ PUBLISHED: tuple[Published, ...] = (
         scenario="paper-i1-full",
         title="I1, λ = 1, full observation",
         kind="captured",
-        defender=None,
         time=2.66,
-        changes=None,
-        first_edge=None,
         exact=True,
         source="Section VI, interaction I1, text on fig:Scn12full",
     ),
@@ -58,7 +55,6 @@ PUBLISHED: tuple[Published, ...] = (
         defender="d1",
         time=1.395,
         changes=(0.16, 0.49, 0.575, 0.915, 0.96),
-        first_edge=None,
         exact=True,
         source="Section VI, interaction I1, text on fig:Scn12pobs, captions of fig:Scn12gph1 to fig:Scn12gph6",
     ),
@@ -68,8 +64,6 @@ PUBLISHED: tuple[Published, ...] = (
         kind="intercepted",
         defender="d2",
         time=2.375,
-        changes=None,
-        first_edge=None,
         exact=True,
         source="Section VI, interaction I1, text on fig:suicidalattacker",
     ),
@@ -79,8 +73,6 @@ PUBLISHED: tuple[Published, ...] = (
         kind="intercepted",
         defender="d1",
         time=1.67,
-        changes=None,
-        first_edge=None,
         exact=True,
         source="Section VI, interaction I1, text on fig:suicidalattacker",
     ),
@@ -90,8 +82,6 @@ PUBLISHED: tuple[Published, ...] = (
         kind="intercepted",
         defender="d1",
         time=3.455,
-        changes=None,
-        first_edge=None,
         exact=False,
         source="Section VI, interaction I2, text on fig:Int2full",
     ),
@@ -99,10 +89,7 @@ PUBLISHED: tuple[Published, ...] = (
         scenario="paper-i2-far",
         title="I2, ζ = (5, 3, 0.3), ζτ = 10",
         kind="captured",
-        defender=None,
         time=4.065,
-        changes=None,
-        first_edge=None,
         exact=False,
         source="Section VI, interaction I2, text on fig:Int2part1",
     ),
@@ -113,7 +100,6 @@ PUBLISHED: tuple[Published, ...] = (
         defender="d1",
         time=3.46,
         changes=(0.51, 0.895, 0.91, 1.2),
-        first_edge=None,
         exact=False,
         source="Section VI, interaction I2, text on fig:Int2part2, captions of fig:Int2gph1 to fig:Int2gph5",
     ),
@@ -123,7 +109,6 @@ PUBLISHED: tuple[Published, ...] = (
         kind="intercepted",
         defender="d1",
         time=3.48,
-        changes=None,
         first_edge=("d3", "attacker", 1.305),
         exact=False,
         source="Section VI, interaction I2, text on fig:Int2part3 and fig:Int2Control2",

@@ -28,14 +28,7 @@ from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 
-from .outcomes import (
-    KINDS,
-    TrialOutcomes,
-    as_level,
-    as_outcomes,
-    indicators,
-    outcome_names,
-)
+from .outcomes import KINDS, TrialOutcomes, as_level, as_outcomes, indicators, outcome_names
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -35,29 +35,11 @@ from .bound.bounds import ThetaBound, theta_bound
 from .checks.adapted_nash import check_nafne, gap_order, sampling_gap
 from .checks.consistency import check_consistency, index_distance
 from .checks.decentral import Decentralised, check_decentral, decentralise
-from .checks.gains import (
-    CertificateRates,
-    certificate_rates,
-    check_gains,
-    lowest_curvature,
-    multistart,
-)
-from .checks.geometry import (
-    check_geometry,
-    moved,
-    off_the_line,
-    radius_delay,
-    relabelled,
-)
+from .checks.gains import CertificateRates, certificate_rates, check_gains, lowest_curvature, multistart
+from .checks.geometry import check_geometry, moved, off_the_line, radius_delay, relabelled
 from .checks.nash import check_equilibrium, riccati_defect
 from .checks.record import check_record
-from .checks.steps import (
-    Refinement,
-    StepStudy,
-    check_steps,
-    refine_batch,
-    step_study,
-)
+from .checks.steps import Refinement, StepStudy, check_steps, refine_batch, step_study
 from .continuous.events import play_by_events
 from .continuous.plays import Event, EventPlay, Slide
 from .continuous.sliding import SlidingStudy, sliding_study

@@ -22,27 +22,9 @@ if TYPE_CHECKING:
 _NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
 _SMALL = 7.5  # points
 
-_OLD: dict[str, Any] = {
-    "color": "0.62",
-    "linewidth": 0.9,
-    "linestyle": "-",
-    "mutation_scale": 7,
-    "zorder": 2.0,
-}
-_NEW: dict[str, Any] = {
-    "color": "black",
-    "linewidth": 1.9,
-    "linestyle": "-",
-    "mutation_scale": 10,
-    "zorder": 2.4,
-}
-_LOST: dict[str, Any] = {
-    "color": "0.45",
-    "linewidth": 0.9,
-    "linestyle": ":",
-    "mutation_scale": 7,
-    "zorder": 1.8,
-}
+_OLD: dict[str, Any] = {"color": "0.62", "linewidth": 0.9, "linestyle": "-", "mutation_scale": 7, "zorder": 2.0}
+_NEW: dict[str, Any] = {"color": "black", "linewidth": 1.9, "linestyle": "-", "mutation_scale": 10, "zorder": 2.4}
+_LOST: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": ":", "mutation_scale": 7, "zorder": 1.8}
 
 
 def network(
@@ -127,24 +109,11 @@ def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge],
             va="center",
             fontsize="small",
             zorder=3.1,
-            bbox={
-                "boxstyle": "circle,pad=0.22",
-                "facecolor": "white",
-                "edgecolor": it.colour,
-                "linewidth": 1.1,
-            },
+            bbox={"boxstyle": "circle,pad=0.22", "facecolor": "white", "edgecolor": it.colour, "linewidth": 1.1},
         )
 
 
-def _arrow(
-    ax: Axes,
-    start: Floats,
-    end: Floats,
-    node: float,
-    *,
-    bend: float,
-    kind: dict[str, Any],
-) -> None:
+def _arrow(ax: Axes, start: Floats, end: Floats, node: float, *, bend: float, kind: dict[str, Any]) -> None:
     """Draw one edge, from the rim of a node to the rim of another, bent when its twin runs the other way."""
     run = end - start
     length = float(np.hypot(*run))
@@ -158,12 +127,6 @@ def _arrow(
     a = start + node * rotated(unit, -turn)
     b = end - (node + 0.03) * rotated(unit, turn)
     arrow = FancyArrowPatch(
-        (a[0], a[1]),
-        (b[0], b[1]),
-        arrowstyle="-|>",
-        connectionstyle=f"arc3,rad={bend}",
-        shrinkA=0,
-        shrinkB=0,
-        **kind,
+        (a[0], a[1]), (b[0], b[1]), arrowstyle="-|>", connectionstyle=f"arc3,rad={bend}", shrinkA=0, shrinkB=0, **kind
     )
     ax.add_patch(arrow)

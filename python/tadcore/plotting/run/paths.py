@@ -107,10 +107,7 @@ def disc(ax: Axes, run: Recorded, *, dashed: bool) -> None:
         u, v = np.mgrid[0 : 2 * np.pi : 19j, 0 : np.pi : 10j]
         ball = [np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)]
         ax.plot_wireframe(  # type: ignore[attr-defined]
-            *(c + radius * b for c, b in zip(centre, ball, strict=True)),
-            color=colour,
-            linewidth=0.3,
-            alpha=0.6,
+            *(c + radius * b for c, b in zip(centre, ball, strict=True)), color=colour, linewidth=0.3, alpha=0.6
         )
         return
     style = {"linestyle": (0, (3, 2))} if dashed else {}

@@ -12,14 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
-from tadcore.plotting.tools.outcomes import (
-    boxes,
-    input_label,
-    outcome_look,
-    parts_of,
-    quantity_label,
-    stack,
-)
+from tadcore.plotting.tools.outcomes import boxes, input_label, outcome_look, parts_of, quantity_label, stack
 from tadcore.plotting.tools.style import COLUMN, symbol
 
 if TYPE_CHECKING:

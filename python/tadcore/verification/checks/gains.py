@@ -66,13 +66,7 @@ def multistart(objective: FullObjective, x: Floats, starts: int, rng: np.random.
 
 
 def check_gains(
-    run: Run,
-    equilibrium: FeedbackSolution,
-    *,
-    instants: int = 20,
-    starts: int = 0,
-    seed: int = 0,
-    bound: bool = False,
+    run: Run, equilibrium: FeedbackSolution, *, instants: int = 20, starts: int = 0, seed: int = 0, bound: bool = False
 ) -> VerificationReport:
     """Check that the gains of a run minimise Θ.
 
