@@ -1,4 +1,4 @@
-"""What the trials of a study say: probabilities, incidence, comparisons, Sobol' indices, and when to stop.
+"""What the trials of a study say: probabilities, incidence, comparisons, and when to stop.
 
 Every function takes plain arrays of outcomes, or the result of a study, and returns a small object that prints as a
 table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
@@ -10,7 +10,6 @@ from .intervals import OutcomeProbabilities, probabilities, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
 from .radius import Breakpoints, RadiusCurve
 from .sequences import HalfWidth, mixture_interval
-from .sobol import Sensitivity, sobol
 
 __all__ = [
     "Breakpoints",
@@ -19,7 +18,6 @@ __all__ = [
     "Incidence",
     "OutcomeProbabilities",
     "RadiusCurve",
-    "Sensitivity",
     "TrialOutcomes",
     "compare",
     "difference_interval",
@@ -30,5 +28,4 @@ __all__ = [
     "paired",
     "probabilities",
     "proportion_interval",
-    "sobol",
 ]

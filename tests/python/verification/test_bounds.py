@@ -14,8 +14,8 @@ from oracle.riccati import equilibrium
 from oracle.scenario import as_mapping
 from oracle.synthesis import Problem, solve
 from samples import random_game, random_network, random_start
-from tadcore import cli
 from tadcore import verification as v
+from tadcore.cli import app as cli
 from tadcore.verification.bound.bounds import bound_theta
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective

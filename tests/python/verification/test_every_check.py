@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import tadcore
-from tadcore import cli
 from tadcore import verification as v
+from tadcore.cli import app as cli
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,8 @@ from tadcore.plotting.tools.style import COLUMN, symbol
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve, Sensitivity
+    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve
+    from tadcore.statistics.sobol import Sensitivity
 
 _ROW = 0.27  # inches for each row of a chart of rows
 
