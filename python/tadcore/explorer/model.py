@@ -62,18 +62,19 @@ class Explorer:
 
     def move(self, player: str, x: float, y: float, *, preview: bool = False) -> None:
         """Start a player elsewhere in the plane that is shown; where it stands along a third axis stays."""
-        field = self._field(player)
+        if player not in self.scenario.players:
+            raise ScenarioError("player", player, f"one of {', '.join(self.scenario.players)}")
         place = self.scenario.positions[self.scenario.players.index(player)].copy()
         place[list(self.plane)] = x, y
-        self._change(f"{field}.position", tuple(place.tolist()), preview=preview)
+        self._change(f"{player}.position", tuple(place.tolist()), preview=preview)
 
     def see(self, player: str, radius: float, *, preview: bool = False) -> None:
         """Give a player another visibility radius; inf for unlimited."""
-        self._change(f"{self._field(player)}.visibility_radius", float(radius), preview=preview)
+        self._change(f"{player}.visibility_radius", float(radius), preview=preview)
 
     def capture(self, player: str, radius: float) -> None:
         """Give a player another capture radius."""
-        self._change(f"{self._field(player)}.capture_radius", float(radius))
+        self._change(f"{player}.capture_radius", float(radius))
 
     def stretch(self, player: str, x: float, y: float, *, preview: bool = False) -> None:
         """Give a player the visibility radius whose disc, around where it stands now, passes through a point."""
@@ -157,10 +158,3 @@ class Explorer:
         sc = self.scenario
         steps = round(sc.horizon / sc.step)
         return sc.step * next(many for many in (*_COARSE, 1) if steps % many == 0)
-
-    def _field(self, player: str) -> str:
-        if player in ("attacker", "target"):
-            return player
-        if player in self.scenario.players:
-            return f"defenders[{int(player[1:]) - 1}]"
-        raise ScenarioError("player", player, f"one of {', '.join(self.scenario.players)}")

@@ -164,7 +164,7 @@ class Labels(Artist):
                     total += 2000.0 * _overlap(places[i], sizes[i], other, sizes[j])
                     total += 60.0 * _crosses(anchors[i], places[i], anchors[j], other)
                     total += 40.0 * _through(anchors[i], places[i], other, sizes[j])
-                    total += 40.0 * _through_one(anchors[j], other, places[i], sizes[i])
+                    total += 40.0 * _through(anchors[j], other, places[i], sizes[i])
                 chosen[i] = int(np.argmin(total))
             if sweep and np.array_equal(before, chosen):
                 break
@@ -242,15 +242,8 @@ def _crosses(start: Floats, ends: Floats, other_start: Floats, other_end: Floats
     return np.asarray((d1 * d2 < 0) & (d3 * d4 < 0))
 
 
-def _through(start: Floats, ends: Floats, other: Floats, size: Floats) -> NDArray[np.bool_]:
-    """Tell which segments ``start``-``ends`` pass through one box."""
+def _through(start: Floats, ends: Floats, centres: Floats, size: Floats) -> NDArray[np.bool_]:
+    """Tell which segments ``start``-``ends`` pass through a box; one segment and many boxes, or many and one."""
     at = np.linspace(0.0, 1.0, 9)[:, None, None]
     path = start + at * (ends - start)
-    return np.asarray((np.abs(path - other) < size / 2).all(axis=2).any(axis=0))
-
-
-def _through_one(start: Floats, end: Floats, centres: Floats, size: Floats) -> NDArray[np.bool_]:
-    """Tell which boxes, one per centre, one segment passes through."""
-    at = np.linspace(0.0, 1.0, 9)[:, None, None]
-    path = start + at * (end - start)
     return np.asarray((np.abs(path - centres) < size / 2).all(axis=2).any(axis=0))

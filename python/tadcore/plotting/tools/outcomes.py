@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch
 
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.paths import short
 
 from .style import look, symbol
 
@@ -79,10 +80,7 @@ def quantity_label(name: str) -> str:
 
 def input_label(name: str) -> str:
     """``defenders.0.position.x`` and its like as symbols, anything else as it is."""
-    owner, _, rest = name.partition(".")
-    if owner == "defenders":
-        index, _, rest = rest.partition(".")
-        owner = f"d{int(index) + 1}" if index.isdigit() else ""
+    owner, _, rest = short(name).partition(".")
     if owner not in ("attacker", "target") and not _is_defender(owner):
         return name
     radius = {"visibility_radius": r"\zeta", "capture_radius": r"\sigma"}.get(rest)

@@ -65,8 +65,7 @@ def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[i
     if player not in sc.constrained:
         raise ScenarioError("player", player, f"one of {', '.join(sc.constrained)}")
     i = sc.constrained.index(player)
-    where = "target" if player == "target" else f"defenders[{i}]"
-    runs = [simulate(sc.replace({f"{where}.visibility_radius": radius})) for radius in (one, other)]
+    runs = [simulate(sc.replace({f"{player}.visibility_radius": radius})) for radius in (one, other)]
     first = min(_first_edge(run, i) for run in runs)
     records = ((runs[0].position, runs[1].position), (runs[0].control, runs[1].control))
     return first, all(np.array_equal(x[:first], y[:first]) for x, y in records)
@@ -80,8 +79,7 @@ def _first_edge(run: Run, i: int) -> int:
 def moved(sc: Scenario, turn: Floats, shift: Floats) -> Scenario:
     """The scenario with every position x at turn x + shift; ``turn`` is orthogonal, shape (dim, dim)."""
     places = (sc.positions @ turn.T + shift).tolist()
-    names = [*(f"defenders[{i}]" for i in range(sc.n)), "target", "attacker"]
-    return sc.replace({f"{name}.position": place for name, place in zip(names, places, strict=True)})
+    return sc.replace({f"{player}.position": place for player, place in zip(sc.players, places, strict=True)})
 
 
 def relabelled(sc: Scenario, order: Sequence[int]) -> Scenario:
