@@ -39,7 +39,7 @@ SIZES = {
     "synthesis/mod.rs": (r"^ +([245678]) => self\.solve_sized::<\1>.*\n", ""),
     "ensemble/sweep.rs": (r"^ +2 1 1; .*\n", "3 2 1; 3 3 1;\n"),
 }
-LIGHTER = {"synthesis": SIZES, "lanes": SIZES}
+LIGHTER = {"synthesis": SIZES, "simd": SIZES}
 # The number is read before `main`, so that a choice in an inner loop is a comparison and no more.
 SWITCH = """
 #[doc(hidden)]

@@ -4,11 +4,12 @@ The text must occur once in its file. The part is an expression, or a statement 
 """
 
 import of_games
-import of_lanes
+import of_newton
 import of_riccati
+import of_simd
 import of_synthesis
 
-MUTANTS = of_riccati.MUTANTS | of_lanes.MUTANTS | of_synthesis.MUTANTS | of_games.MUTANTS
+MUTANTS = of_simd.MUTANTS | of_riccati.MUTANTS | of_newton.MUTANTS | of_synthesis.MUTANTS | of_games.MUTANTS
 
 # Mutants that no test can tell from the program: (file, formula): why.
 EQUIVALENT = {
@@ -21,10 +22,10 @@ EQUIVALENT = {
         "a pivot to divide by",
     ): "a refused lane is not used, and empty unknowns stand among zeros",
     (
-        "synthesis/newton/factor_avx2.rs",
+        "synthesis/newton/factor_one.rs",
         "registers: empty unknowns, first",
     ): "every tile holds an unknown, the first one",
-    ("synthesis/newton/factor_avx2.rs", "registers: eight rows"): "two tiles one after the other give the same bits",
+    ("synthesis/newton/factor_one.rs", "registers: eight rows"): "two tiles one after the other give the same bits",
     ("cost/mod.rs", "J: Horner"): "it reverses z from one end of a step to the other, and costs are quadratic in z",
     ("network/visibility.rs", "rounded root, down"): "the next loop climbs back to the same number",
 }

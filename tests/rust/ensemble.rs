@@ -265,7 +265,7 @@ fn what_this_process_does() {
         Err(error) => println!("refused: {error}"),
         Ok(_) => {
             let case = case(Interaction::I1, 3, 2, 100, true, DEFAULT_TABLE_BYTES);
-            println!("used: {} {:?}", tadcore::width::in_use().expect("a width"), case.play(1));
+            println!("used: {} {:?}", tadcore::simd::in_use().expect("a width"), case.play(1));
         }
     }
 }

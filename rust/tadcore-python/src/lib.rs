@@ -28,7 +28,7 @@ mod _core {
     /// The vector instructions in use.
     #[pyfunction]
     fn simd(py: Python<'_>) -> PyResult<&'static str> {
-        tadcore::width::in_use().map_err(|error| errors::simd(py, &error))
+        tadcore::simd::in_use().map_err(|error| errors::simd(py, &error))
     }
 
     #[pymodule_init]

@@ -38,8 +38,7 @@
 //! | layer | what it knows |
 //! |---|---|
 //! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
-//! | [`width`] | loops compiled for each vector width |
-//! | `lanes` | one number, or several side by side in a register |
+//! | [`simd`] | vector instructions; loops compiled for each width of the registers |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
 //! | [`network`] | who sees whom; what each player may use |
@@ -65,10 +64,9 @@ pub mod cost;
 pub mod ensemble;
 pub mod error;
 pub mod game;
-mod lanes;
 pub mod network;
 pub mod policy;
 pub mod riccati;
+pub mod simd;
 pub mod simulation;
 pub mod synthesis;
-pub mod width;

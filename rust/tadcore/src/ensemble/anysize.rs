@@ -2,9 +2,11 @@
 
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, playing};
 use crate::policy::step_table::{Shelf, padded};
+use crate::simd::Width;
 
 /// One step of the strips from one on; a [`Sweep`](super::strip::Sweep) that does not look ahead.
 pub(super) fn sweep_any(
+    _: Width,
     shape: &Shape,
     strips: &mut Strips,
     from: usize,

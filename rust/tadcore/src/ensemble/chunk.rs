@@ -14,8 +14,8 @@ use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
 use crate::policy::step_table::Shelf;
 use crate::policy::transitions::Filler;
+use crate::simd::Width;
 use crate::simulation::{Outcome, Reach};
-use crate::width::Width;
 
 /// How one trial ended, and the grid index of its end.
 pub(super) type End = (Outcome, usize);
@@ -52,6 +52,7 @@ pub(super) struct Chunk<'a> {
     batch: &'a Batch<'a>,
     first: usize,
     shape: Shape,
+    width: Width,
     sweep: Sweep,
     strips: Strips,
     /// Which trial of the chunk stands in each place.
@@ -79,7 +80,7 @@ impl<'a> Chunk<'a> {
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who = (0..trials as u32).collect();
         let strips = Strips { z, sight, capture, sight_step, capture_step, live: trials };
-        Self { policy, batch, first, shape, sweep: sweep_of(&shape, width), strips, who }
+        Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), strips, who }
     }
 
     /// Plays every trial to its end.
@@ -114,7 +115,7 @@ impl<'a> Chunk<'a> {
     fn pass(&mut self, k: usize, shelf: &Shelf, next: Option<&Shelf>, ends: &mut [End], w: &mut Worker) {
         let mut from = 0;
         loop {
-            match (self.sweep)(&self.shape, &mut self.strips, from, shelf, next, &mut w.keys) {
+            match (self.sweep)(self.width, &self.shape, &mut self.strips, from, shelf, next, &mut w.keys) {
                 Stop::End => return,
                 Stop::Caught(strip, lanes) => {
                     self.retire(strip, lanes, k, ends);
@@ -159,7 +160,7 @@ impl<'a> Chunk<'a> {
     fn alone(&mut self, strip: usize, shelf: &Shelf, keys: &mut Keys) -> bool {
         let live = self.strips.live;
         self.strips.live = live.min((strip + 1) * LANES);
-        let stop = (self.sweep)(&self.shape, &mut self.strips, strip, shelf, None, keys);
+        let stop = (self.sweep)(self.width, &self.shape, &mut self.strips, strip, shelf, None, keys);
         self.strips.live = live;
         stop == Stop::End
     }

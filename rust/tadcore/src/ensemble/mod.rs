@@ -15,7 +15,6 @@ mod anysize;
 mod chunk;
 mod strip;
 mod sweep;
-mod vector;
 
 use std::thread::available_parallelism;
 
@@ -24,8 +23,8 @@ use rayon::prelude::*;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::policy::Policy;
+use crate::simd::Width;
 use crate::simulation::{Outcome, Setup};
-use crate::width::Width;
 use chunk::{Chunk, End, Worker};
 
 /// Trials of one chunk at most.
@@ -92,7 +91,7 @@ pub fn run(
     }
     let mut ends = vec![(Outcome::Timeout, 0); trials];
     let threads = threads.filter(|&t| t > 0).unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
-    play(policy, batch, threads, Width::detect(), &mut ends, cancel)?;
+    play(policy, batch, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
 }
 

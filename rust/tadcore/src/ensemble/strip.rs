@@ -10,6 +10,7 @@
 //! A [`Sweep`] moves strips; [`super::sweep`] has it compiled for the sizes that matter, [`super::anysize`] for all others.
 
 use crate::policy::step_table::Shelf;
+use crate::simd::Width;
 
 /// Trials side by side.
 pub(super) const LANES: usize = 8;
@@ -64,7 +65,7 @@ pub(super) type Keys = Vec<[u64; LANES]>;
 ///
 /// The first shelf is the instant's. The second, if there is one, is the next instant's: it is fetched from memory while
 /// the strips move.
-pub(super) type Sweep = fn(&Shape, &mut Strips, usize, &Shelf, Option<&Shelf>, &mut Keys) -> Stop;
+pub(super) type Sweep = fn(Width, &Shape, &mut Strips, usize, &Shelf, Option<&Shelf>, &mut Keys) -> Stop;
 
 impl Strips {
     /// Copies a trial from one place to another.

@@ -1,7 +1,7 @@
 //! One step of eight trials at a time: who is caught, who sees whom, and the product, in vector registers.
 //!
 //! Every sum runs in the order of [`crate::simulation::simulate`] and no product is fused with a sum, so that a trial
-//! ends as it would alone, to the bit, at every [`Width`].
+//! ends as it would alone, to the bit, at every [`Width`](crate::simd::Width).
 //!
 //! Memory is what a step waits for, so nothing is asked for when it is needed: a block of strips is looked at before any
 //! of them moves, which puts independent work between a lookup and the product that needs it, and every block fetches a
@@ -9,12 +9,9 @@
 
 use super::anysize::sweep_any;
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
-use super::vector::{Plain, Vector};
-#[cfg(target_arch = "x86_64")]
-use super::vector::{Wide256, Wide512};
 use crate::policy::index::DIRECT_BITS;
 use crate::policy::step_table::Shelf;
-use crate::width::Width;
+use crate::simd::{Number, Simd, dispatch};
 
 /// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
 /// cache in between.
@@ -43,31 +40,31 @@ macro_rules! unrolled {
 
 /// ‖z_i‖² of eight trials, the axes added in order.
 #[inline(always)]
-fn norm<V: Vector, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
-    let first = V::load(&z[i * D]);
-    let mut sum = V::mul(first, first);
+fn norm<V: Simd, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
+    let first = V::Eight::load(&z[i * D]);
+    let mut sum = first * first;
     for x in 1..D {
-        let a = V::load(&z[i * D + x]);
-        sum = V::add(sum, V::mul(a, a));
+        let a = V::Eight::load(&z[i * D + x]);
+        sum = sum + a * a;
     }
     sum
 }
 
 /// ‖z_i − z_j‖² of eight trials.
 #[inline(always)]
-fn distance<V: Vector, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight {
-    let first = V::sub(V::load(&z[i * D]), V::load(&z[j * D]));
-    let mut sum = V::mul(first, first);
+fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight {
+    let first = V::Eight::load(&z[i * D]) - V::Eight::load(&z[j * D]);
+    let mut sum = first * first;
     for x in 1..D {
-        let a = V::sub(V::load(&z[i * D + x]), V::load(&z[j * D + x]));
-        sum = V::add(sum, V::mul(a, a));
+        let a = V::Eight::load(&z[i * D + x]) - V::Eight::load(&z[j * D + x]);
+        sum = sum + a * a;
     }
     sum
 }
 
 /// The keys of one strip, and a bit for each trial in which somebody is caught.
 #[inline(always)]
-fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
+fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
     z: &[Lane],
     sight: &[Lane],
     capture: &[Lane],
@@ -76,16 +73,16 @@ fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
     let mut caught = 0;
     unrolled!(I < N, {
         let d2 = norm::<V, D>(z, I);
-        caught |= V::within(d2, V::load(&capture[I]));
+        caught |= V::Eight::bits(d2.at_most(V::Eight::load(&capture[I]))) as u8;
         if I < M {
-            keys = V::see(keys, 1 << (I * N + I), d2, V::load(&sight[I]));
+            keys = V::set(keys, 1 << (I * N + I), d2.at_most(V::Eight::load(&sight[I])));
         }
         unrolled!(J < I, {
             let d2 = distance::<V, D>(z, I, J);
             if I < M {
-                keys = V::see(keys, 1 << (I * N + J), d2, V::load(&sight[I]));
+                keys = V::set(keys, 1 << (I * N + J), d2.at_most(V::Eight::load(&sight[I])));
             }
-            keys = V::see(keys, 1 << (J * N + I), d2, V::load(&sight[J]));
+            keys = V::set(keys, 1 << (J * N + I), d2.at_most(V::Eight::load(&sight[J])));
         });
     });
     (keys, caught)
@@ -93,34 +90,35 @@ fn observe<V: Vector, const N: usize, const M: usize, const D: usize>(
 
 /// z ← exp(Cδ) z for one strip whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
 #[inline(always)]
-fn step<V: Vector, const N: usize, const D: usize, const Q: usize, const E: usize>(
+fn step<V: Simd, const N: usize, const D: usize, const Q: usize, const E: usize>(
     z: &mut [Lane],
     slots: &[u32; LANES],
     matrices: &[[[f64; 4]; E]],
 ) {
     for half in 0..2 {
-        let mut next = [[[V::load4(&[0.0; 4]); 4]; Q]; D];
+        let mut next = [[[V::Four::splat(0.0); 4]; Q]; D];
         for l in 0..4 {
             let lane = 4 * half + l;
             let t = &matrices[slots[lane] as usize];
             for q in 0..Q {
                 for x in 0..D {
-                    next[x][q][l] = V::scale4(V::load4(&t[q]), z[x][lane]);
+                    next[x][q][l] = V::Four::load(&t[q]) * V::Four::splat(z[x][lane]);
                 }
                 for j in 1..N {
-                    let column = V::load4(&t[j * Q + q]);
+                    let column = V::Four::load(&t[j * Q + q]);
                     for x in 0..D {
-                        next[x][q][l] = V::add_scaled4(next[x][q][l], column, z[j * D + x][lane]);
+                        // Rounded twice: no product is fused with a sum.
+                        next[x][q][l] = next[x][q][l] + column * V::Four::splat(z[j * D + x][lane]);
                     }
                 }
             }
         }
         for x in 0..D {
             for q in 0..Q {
-                let rows = V::transpose4(next[x][q]);
+                let rows = V::transpose(next[x][q]);
                 for r in 0..4 {
                     if 4 * q + r < N {
-                        V::store4(rows[r], &mut z[(4 * q + r) * D + x].as_chunks_mut().0[half]);
+                        rows[r].store(&mut z[(4 * q + r) * D + x][4 * half..]);
                     }
                 }
             }
@@ -133,7 +131,7 @@ const _: () = assert!(DIRECT_BITS <= 16);
 
 /// Writes the slots of eight topologies; whether all are on the shelf.
 #[inline(always)]
-fn look_up<V: Vector, const N: usize, const M: usize>(
+fn look_up<V: Simd, const N: usize, const M: usize>(
     seen: V::Keys,
     direct: &[u16],
     shelf: &Shelf,
@@ -162,7 +160,7 @@ fn look_up<V: Vector, const N: usize, const M: usize>(
 
 /// One step of the strips from one on, as far as they can move: a [`Sweep`].
 #[inline(always)]
-fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
+fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
     strips: &mut Strips,
     from: usize,
     shelf: &Shelf,
@@ -217,57 +215,26 @@ fn sweep<V: Vector, const N: usize, const M: usize, const D: usize, const Q: usi
     Stop::End
 }
 
-/// A sweep compiled for its sizes and for a width's registers.
-fn sized<const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(width: Width) -> Sweep {
-    match width {
-        Width::Baseline => {
-            |_, strips, from, shelf, next, keys| sweep::<Plain, N, M, D, Q, E>(strips, from, shelf, next, keys)
-        }
-        #[cfg(target_arch = "x86_64")]
-        Width::Avx2 => {
-            #[target_feature(enable = "avx2")]
-            fn wide<const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
-                strips: &mut Strips,
-                from: usize,
-                shelf: &Shelf,
-                next: Option<&Shelf>,
-                keys: &mut Keys,
-            ) -> Stop {
-                sweep::<Wide256, N, M, D, Q, E>(strips, from, shelf, next, keys)
-            }
-            |_, strips, from, shelf, next, keys| {
-                debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
-                // SAFETY: this width exists only where the processor said that it has AVX2.
-                unsafe { wide::<N, M, D, Q, E>(strips, from, shelf, next, keys) }
-            }
-        }
-        #[cfg(target_arch = "x86_64")]
-        Width::Avx512 => {
-            #[target_feature(enable = "avx2,avx512f,avx512vl")]
-            fn wide<const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
-                strips: &mut Strips,
-                from: usize,
-                shelf: &Shelf,
-                next: Option<&Shelf>,
-                keys: &mut Keys,
-            ) -> Stop {
-                sweep::<Wide512, N, M, D, Q, E>(strips, from, shelf, next, keys)
-            }
-            |_, strips, from, shelf, next, keys| {
-                debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
-                // SAFETY: this width exists only where the processor said that it has AVX2, AVX-512F and AVX-512VL.
-                unsafe { wide::<N, M, D, Q, E>(strips, from, shelf, next, keys) }
-            }
-        }
+dispatch! {
+    /// A sweep compiled for its sizes.
+    fn sized<V, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
+        _shape: &Shape,
+        strips: &mut Strips,
+        from: usize,
+        shelf: &Shelf,
+        next: Option<&Shelf>,
+        keys: &mut Keys,
+    ) -> Stop {
+        sweep::<V, N, M, D, Q, E>(strips, from, shelf, next, keys)
     }
 }
 
 /// The sweep for a shape: compiled for N ≤ 8 in the plane and in space, one version for all else.
-pub(super) fn sweep_of(shape: &Shape, width: Width) -> Sweep {
+pub(super) fn sweep_of(shape: &Shape) -> Sweep {
     macro_rules! choose {
         ($($n:literal $m:literal $q:literal;)*) => {
             match (shape.size, shape.rows, shape.dim) {
-                $(($n, $m, 2) => sized::<$n, $m, 2, $q, { $n * $q }>(width), ($n, $m, 3) => sized::<$n, $m, 3, $q, { $n * $q }>(width),)*
+                $(($n, $m, 2) => sized::<$n, $m, 2, $q, { $n * $q }>, ($n, $m, 3) => sized::<$n, $m, 3, $q, { $n * $q }>,)*
                 _ => sweep_any,
             }
         };

@@ -24,7 +24,7 @@ pub(crate) mod validation;
 pub use grid::Grid;
 
 use crate::error::GameError;
-use crate::width;
+use crate::simd;
 
 /// Which of the paper's two interactions is played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -91,7 +91,7 @@ impl Game {
     /// # Errors
     /// [`GameError`] naming the first field that breaks its rule, or `TADCORE_SIMD` if that cannot be followed.
     pub fn new(interaction: Interaction, weights: Weights, grid: Grid) -> Result<Self, GameError> {
-        width::in_use()?;
+        simd::in_use()?;
         validation::weights(interaction, weights.r_d.len(), &weights)?;
         validation::size(interaction, weights.r_d.len(), grid.steps())?;
         Ok(Self { interaction, weights, grid })

@@ -8,7 +8,7 @@
 //! Where an entry lies is its slot ([`super::index`]). Slot 0 is never a topology's: a lookup that gives 0 found nothing.
 
 use super::index::Index;
-use crate::width::prefetch;
+use crate::simd::prefetch;
 
 /// Bytes of a cache line.
 const LINE: usize = 64;

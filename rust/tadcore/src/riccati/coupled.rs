@@ -23,13 +23,12 @@
 
 use super::dop853::{self, Flow};
 use super::large::Large;
-use super::register::fused;
 use super::stages::LANES;
 use super::{finite, triangle, weight};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
-use crate::width::Width;
+use crate::simd::{Width, dispatch};
 
 /// Local error per step, in the weighted norm of [`dop853`]. Over 215 random games (n = 1…12, weights within two orders of
 /// magnitude) this keeps every node to 1.9e-11, in the median to 2e-12; else to what the conditioning of the game allows.
@@ -139,7 +138,7 @@ fn add_transpose<const B: usize>(tiles: usize, stride: usize, g: &[f64], out: &m
     }
 }
 
-fused! {
+dispatch! {
     #[inline(never)]
     fn small<V, const N: usize, const L: usize, const R: usize, const B: usize>(flow: &mut Small<N, L, R, B>, y: &[f64], dy: &mut [f64]) {
         flow.evaluate(y, dy);
@@ -162,7 +161,7 @@ impl<const N: usize, const L: usize, const R: usize, const B: usize> Flow for Sm
 /// Solves eq:Riccati backward over the grid of `game`, writing N × N matrices into `nodes`, laid out (k, p, i, j).
 /// Returns the number of steps.
 pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
-    let (n, width) = (game.size(), Width::detect());
+    let (n, width) = (game.size(), Width::in_use());
     macro_rules! small {
         ($n:literal, $l:literal, $r:literal, $b:literal) => {{
             let flow = &mut Small::<$n, $l, $r, $b>::new(game, width);
@@ -262,7 +261,7 @@ mod tests {
     fn large_and_small_agree() -> Result<(), crate::error::GameError> {
         let game = bank::varied_game(Interaction::I1, 6, 1.0, 0.1)?;
         let (mut large, mut small) =
-            (Large::new(&game, Width::detect()), Small::<7, 8, 4, 4>::new(&game, Width::detect()));
+            (Large::new(&game, Width::in_use()), Small::<7, 8, 4, 4>::new(&game, Width::in_use()));
         let entry = |p: usize, i: usize, j: usize| ((1 + p + i.min(j) + 3 * i.max(j)) as f64).sin();
         let (block, whole) = (large.block_len(), small.block_len());
         let (mut y, mut y_whole) = (vec![0.0; 3 * block], vec![0.0; 3 * whole]);

@@ -16,12 +16,11 @@
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4 to II.6.
 
-use super::aligned::Aligned;
 use super::escape;
 use super::stages::{self, DENSE, STAGES};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
-use crate::width::Width;
+use crate::simd::{Aligned, Width};
 
 /// Attempted steps after which the integrator gives up. A game that needs more is stiff (a rate some 10⁶ times the
 /// inverse of the horizon), not escaping; ordinary games take some hundred steps, the wildest seen 10⁴.
@@ -64,7 +63,7 @@ impl Workspace {
         let mut y = Aligned::zeros(len);
         y.copy_from_slice(y0);
         Self {
-            width: Width::detect(),
+            width: Width::in_use(),
             len,
             block,
             y,

@@ -26,7 +26,7 @@ use super::escape;
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
-use crate::width::{Width, widened};
+use crate::simd::{Width, widened};
 
 /// Largest bound on ‖X − I‖ for which a step is taken.
 const BOUND: f64 = 0.5;
@@ -254,14 +254,14 @@ fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64])
 
 widened! {
     #[inline(never)]
-    fn advance_small<const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+    fn advance_small<V, const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
         advance(N, level, p, z, g);
     }
 }
 
 widened! {
     #[inline(never)]
-    fn advance_large(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+    fn advance_large<V>(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
         advance(n, level, p, z, g);
     }
 }
@@ -270,7 +270,7 @@ widened! {
 /// the number of steps.
 pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
     let mut flow = Flow::new(game);
-    let (n, grid, width) = (flow.n, game.grid(), Width::detect());
+    let (n, grid, width) = (flow.n, game.grid(), Width::in_use());
     let (horizon, steps) = (grid.horizon(), grid.steps());
     let mut p = vec![0.0; n * n];
     for (i, f) in game.state_weights(true)[0].iter().enumerate() {

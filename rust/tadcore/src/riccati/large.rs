@@ -17,13 +17,11 @@
 //!
 //! Source: eq:Riccati of the paper as in [`super::coupled`]; the tiles are ours, by measurement.
 
-use super::aligned::Aligned;
 use super::dop853::Flow;
-use super::register::{Pack, Registers, fused};
 use super::triangle::{self, PANEL, TILE};
 use super::weight;
 use crate::game::Game;
-use crate::width::Width;
+use crate::simd::{Aligned, Number, Simd, Width, dispatch};
 
 /// A row of a panel.
 type Row = [f64; PANEL];
@@ -61,7 +59,7 @@ impl Large {
     }
 
     #[inline(always)]
-    fn evaluate<V: Registers>(&mut self, y: &[f64], dy: &mut [f64]) {
+    fn evaluate<V: Simd>(&mut self, y: &[f64], dy: &mut [f64]) {
         let (n, tiles, height, block) = (self.n, self.tiles, self.height, triangle::len(self.tiles));
         for (p, y) in self.p.iter_mut().zip(y.chunks_exact(block)) {
             triangle::expand::<V>(tiles, height, y, p);
@@ -76,7 +74,7 @@ impl Large {
         for (((m, d), target), attacker) in panels.zip(d).zip(target).zip(attacker) {
             let rows = d[..n - 1].iter().chain([&target[n - 1], &attacker[n]]);
             for ((m, row), scale) in m.iter_mut().zip(rows).zip(&self.scales) {
-                V::Eight::splat(*scale).mul(V::Eight::load(row)).store(m);
+                (V::Eight::splat(*scale) * V::Eight::load(row)).store(m);
             }
         }
         for p in 0..3 {
@@ -114,14 +112,14 @@ fn rows_mut(panels: &mut [f64]) -> &mut [Row] {
 
 /// The sum of rows, a multiple of four of them.
 #[inline(always)]
-fn row_sum<V: Registers>(rows: &[Row]) -> V::Eight {
+fn row_sum<V: Simd>(rows: &[Row]) -> V::Eight {
     let mut sum = [V::Eight::splat(0.0); TILE];
     for four in rows.as_chunks::<TILE>().0 {
         for r in 0..TILE {
-            sum[r] = sum[r].add(V::Eight::load(&four[r]));
+            sum[r] = sum[r] + V::Eight::load(&four[r]);
         }
     }
-    sum[0].add(sum[1]).add(sum[2].add(sum[3]))
+    (sum[0] + sum[1]) + (sum[2] + sum[3])
 }
 
 /// Σ_k (pᵀ μ + μᵀ p) over so many `terms`, the first of them, up to `once`, as pᵀ μ alone.
@@ -136,7 +134,7 @@ struct Update<'a> {
 impl<'a> Update<'a> {
     /// All tiles on and below the diagonal.
     #[inline(always)]
-    fn lower<V: Registers>(&self, tiles: usize, out: &mut [f64]) {
+    fn lower<V: Simd>(&self, tiles: usize, out: &mut [f64]) {
         let out = &mut out.as_chunks_mut::<TILE>().0.as_chunks_mut::<TILE>().0[..triangle::len(tiles) / (TILE * TILE)];
         let mut i = 0;
         while i < tiles {
@@ -180,7 +178,7 @@ impl<'a> Update<'a> {
 
     /// R rows that the first function picks of one panel by W columns that the other picks of another.
     #[inline(always)]
-    fn product<P: Pack<W>, const R: usize, const W: usize>(
+    fn product<P: Number<Scalar = f64>, const R: usize, const W: usize>(
         &self,
         (i, left): (usize, impl Fn(&Row) -> &[f64; R]),
         (j, right): (usize, impl Fn(&Row) -> &[f64; W]),
@@ -199,7 +197,7 @@ impl<'a> Update<'a> {
 
     /// Eight rows up to the diagonal: four of them have four columns, and the others eight.
     #[inline(always)]
-    fn diagonal<V: Registers>(&self, panel: usize) -> ([V::Four; TILE], [V::Eight; TILE]) {
+    fn diagonal<V: Simd>(&self, panel: usize) -> ([V::Four; TILE], [V::Eight; TILE]) {
         let (p, m) = self.panel(panel);
         let (mut top, mut bottom) = ([V::Four::splat(0.0); TILE], [V::Eight::splat(0.0); TILE]);
         for (p, m) in p.iter().zip(m).take(self.once) {
@@ -223,22 +221,26 @@ fn high(row: &Row) -> &[f64; TILE] {
 
 /// sum + leftᵀ right.
 #[inline(always)]
-fn add<P: Pack<W>, const R: usize, const W: usize>(left: &[f64; R], right: &[f64; W], mut sum: [P; R]) -> [P; R] {
+fn add<P: Number<Scalar = f64>, const R: usize>(left: &[f64; R], right: &[f64], mut sum: [P; R]) -> [P; R] {
     let right = P::load(right);
     for r in 0..R {
-        sum[r] = P::splat(left[r]).mul_add(right, sum[r]);
+        sum[r] = sum[r].plus(P::splat(left[r]), right);
     }
     sum
 }
 
 type Tile = [[f64; TILE]; TILE];
 
+// No closures below: they are functions of their own, and the compiler would not inline the wide instructions into them.
+
 /// Writes tile (I, J); one on the diagonal as the mean of itself and its transpose, symmetric to the bit.
 #[inline(always)]
-fn put<V: Registers>(mut tile: [V::Four; TILE], i: usize, j: usize, out: &mut [Tile]) {
+fn put<V: Simd>(mut tile: [V::Four; TILE], i: usize, j: usize, out: &mut [Tile]) {
     if i == j {
         let transpose = V::transpose(tile);
-        tile = std::array::from_fn(|r| V::Four::splat(0.5).mul(tile[r].add(transpose[r])));
+        for r in 0..TILE {
+            tile[r] = V::Four::splat(0.5) * (tile[r] + transpose[r]);
+        }
     }
     let out = &mut out[triangle::number(i, j)];
     for r in 0..TILE {
@@ -248,13 +250,16 @@ fn put<V: Registers>(mut tile: [V::Four; TILE], i: usize, j: usize, out: &mut [T
 
 /// Writes the two tiles of row I in panel `j`.
 #[inline(always)]
-fn put_wide<V: Registers>(rows: [V::Eight; TILE], i: usize, j: usize, out: &mut [Tile]) {
-    let halves = rows.map(V::halves);
-    put::<V>(halves.map(|[left, _]| left), i, 2 * j, out);
-    put::<V>(halves.map(|[_, right]| right), i, 2 * j + 1, out);
+fn put_wide<V: Simd>(rows: [V::Eight; TILE], i: usize, j: usize, out: &mut [Tile]) {
+    let (mut left, mut right) = ([V::Four::splat(0.0); TILE], [V::Four::splat(0.0); TILE]);
+    for r in 0..TILE {
+        [left[r], right[r]] = V::halves(rows[r]);
+    }
+    put::<V>(left, i, 2 * j, out);
+    put::<V>(right, i, 2 * j + 1, out);
 }
 
-fused! {
+dispatch! {
     #[inline(never)]
     fn evaluate<V>(flow: &mut Large, y: &[f64], dy: &mut [f64]) {
         flow.evaluate::<V>(y, dy);

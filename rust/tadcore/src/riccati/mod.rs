@@ -31,20 +31,16 @@
 //!
 //! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node.
 
-mod aligned;
 mod coupled;
 mod dop853;
 mod escape;
 mod hamiltonian;
 mod large;
-mod register;
 mod residual;
 mod stages;
 mod tableau;
 mod triangle;
 mod weight;
-
-use std::alloc::{Layout, alloc_zeroed};
 
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
@@ -84,15 +80,8 @@ pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, Equilibri
 
 /// Memory that the system hands out zeroed, or a refusal where a plain allocation would end the process.
 fn zeros(numbers: usize) -> Result<Vec<f64>, EquilibriumError> {
-    let refused = || EquilibriumError::Memory { bytes: numbers.saturating_mul(size_of::<f64>()) };
-    let layout = Layout::array::<f64>(numbers).map_err(|_| refused())?;
-    // SAFETY: the layout is not empty, since every grid has a node and every node a matrix.
-    let start = unsafe { alloc_zeroed(layout) }.cast::<f64>();
-    if start.is_null() {
-        return Err(refused());
-    }
-    // SAFETY: the memory is the global allocator's, for an array of so many numbers, all of them 0.0.
-    Ok(unsafe { Vec::from_raw_parts(start, numbers, numbers) })
+    bytemuck::try_zeroed_vec(numbers)
+        .map_err(|()| EquilibriumError::Memory { bytes: numbers.saturating_mul(size_of::<f64>()) })
 }
 
 /// Whether all numbers are.

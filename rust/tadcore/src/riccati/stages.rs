@@ -1,4 +1,4 @@
-//! out = base + h Σ_j a_j k_j: the loops over the state, in whole vector lanes, at the processor's [`crate::width`].
+//! out = base + h Σ_j a_j k_j: the loops over the state, in whole vector lanes, at the processor's [`Width`](crate::simd::Width).
 //!
 //! A product and the sum it goes into are one operation.
 //!
@@ -9,8 +9,8 @@
 //!
 //! Source: the method of `dop853`; the layout is ours, by measurement.
 
-use super::register::{Pack, Registers, fused};
 use super::tableau as t;
+use crate::simd::{Number, Simd, dispatch};
 
 /// Entries handled together.
 pub(super) const LANES: usize = 8;
@@ -37,24 +37,24 @@ fn stages<'a, T, const M: usize>(k: &'a [f64], len: usize, row: &[(usize, T); M]
 
 /// Σ_j a_j k_j at lane i.
 #[inline(always)]
-fn sum<V: Registers, const M: usize>(k: &[&[Lane]; M], row: &[(usize, f64); M], i: usize) -> V::Eight {
-    let mut sum = V::Eight::splat(row[0].1).mul(V::Eight::load(&k[0][i]));
+fn sum<V: Simd, const M: usize>(k: &[&[Lane]; M], row: &[(usize, f64); M], i: usize) -> V::Eight {
+    let mut sum = V::Eight::splat(row[0].1) * V::Eight::load(&k[0][i]);
     for j in 1..M {
-        sum = V::Eight::splat(row[j].1).mul_add(V::Eight::load(&k[j][i]), sum);
+        sum = sum.plus(V::Eight::splat(row[j].1), V::Eight::load(&k[j][i]));
     }
     sum
 }
 
 #[inline(always)]
-fn step<V: Registers, const M: usize>(out: &mut [f64], y: &[f64], k: &[f64], row: &[(usize, f64); M], h: f64) {
+fn step<V: Simd, const M: usize>(out: &mut [f64], y: &[f64], k: &[f64], row: &[(usize, f64); M], h: f64) {
     let len = out.len();
     let (y, k, h) = (&lanes(&y[..len])[..len / LANES], stages(k, len, row), V::Eight::splat(h));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
-        h.mul_add(sum::<V, M>(&k, row, i), V::Eight::load(&y[i])).store(out);
+        V::Eight::load(&y[i]).plus(h, sum::<V, M>(&k, row, i)).store(out);
     }
 }
 
-fused! {
+dispatch! {
     /// The point at which stage `i` (from zero) is evaluated; 12 is the new point.
     #[inline(never)]
     pub(super) fn point<V>(i: usize, out: &mut [f64], y: &[f64], k: &[f64], h: f64) {
@@ -78,7 +78,7 @@ fused! {
     }
 }
 
-fused! {
+dispatch! {
     /// Σ (w e5)², Σ (w e3)² and Σ (w y)² over the block of entries from `start`.
     #[inline(never)]
     pub(super) fn error_sums<V>(k: &[f64], y: &[f64], weight: &[f64], start: usize, block: usize) -> (f64, f64, f64) {
@@ -89,11 +89,11 @@ fused! {
         let (mut five, mut three, mut size) = (V::Eight::splat(0.0), V::Eight::splat(0.0), V::Eight::splat(0.0));
         for i in 0..count {
             let weight = V::Eight::load(&weight[i]);
-            let (e5, e3) = (weight.mul(sum::<V, _>(&k5, &t::E5, i)), weight.mul(sum::<V, _>(&k3, &t::E3, i)));
-            let y = weight.mul(V::Eight::load(&y[i]));
-            five = e5.mul_add(e5, five);
-            three = e3.mul_add(e3, three);
-            size = y.mul_add(y, size);
+            let (e5, e3) = (weight * sum::<V, _>(&k5, &t::E5, i), weight * sum::<V, _>(&k3, &t::E3, i));
+            let y = weight * V::Eight::load(&y[i]);
+            five = five.plus(e5, e5);
+            three = three.plus(e3, e3);
+            size = size.plus(y, y);
         }
         let total = |x: V::Eight| {
             let mut lanes = [0.0; LANES];
@@ -104,7 +104,7 @@ fused! {
     }
 }
 
-fused! {
+dispatch! {
     /// The dense output's coefficients for the step from `y` to `y_new`.
     #[inline(never)]
     pub(super) fn dense<V>(out: &mut [f64], y: &[f64], y_new: &[f64], k: &[f64], h: f64) {
@@ -120,22 +120,22 @@ fused! {
             for j in 0..t::D.len() {
                 let k = V::Eight::load(&used[j][i]);
                 for q in 0..4 {
-                    sum[q] = V::Eight::splat(t::D[j].1[q]).mul_add(k, sum[q]);
+                    sum[q] = sum[q].plus(V::Eight::splat(t::D[j].1[q]), k);
                 }
             }
             let (first, last) = (V::Eight::load(&first[i]), V::Eight::load(&last[i]));
-            let dy = V::Eight::load(&y_new[i]).sub(V::Eight::load(&y[i]));
+            let dy = V::Eight::load(&y_new[i]) - V::Eight::load(&y[i]);
             dy.store(&mut out[i]);
-            h.mul(first).sub(dy).store(&mut out[count + i]);
-            two.mul(dy).sub(h.mul(first.add(last))).store(&mut out[2 * count + i]);
+            (h * first - dy).store(&mut out[count + i]);
+            (two * dy - h * (first + last)).store(&mut out[2 * count + i]);
             for q in 0..4 {
-                h.mul(sum[q]).store(&mut out[(3 + q) * count + i]);
+                (h * sum[q]).store(&mut out[(3 + q) * count + i]);
             }
         }
     }
 }
 
-fused! {
+dispatch! {
     /// The dense output at M places θ in (0, 1], one after the other in `out`.
     #[inline(never)]
     pub(super) fn interpolate<V, const M: usize>(out: &mut [f64], y: &[f64], dense: &[f64], theta: [f64; M]) {
@@ -155,7 +155,7 @@ fused! {
             for j in 0..DENSE {
                 let d = V::Eight::load(&dense[j * count + i]);
                 for m in 0..M {
-                    sum[m] = V::Eight::splat(weights[m][j]).mul_add(d, sum[m]);
+                    sum[m] = sum[m].plus(V::Eight::splat(weights[m][j]), d);
                 }
             }
             for m in 0..M {
@@ -168,7 +168,7 @@ fused! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::width::Width;
+    use crate::simd::Width;
 
     /// Points, error sums, dense output and its values have the same bits for every vector width.
     #[test]

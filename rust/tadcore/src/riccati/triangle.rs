@@ -7,7 +7,7 @@
 //!
 //! Source: ours, by measurement.
 
-use super::register::{Pack, Registers, fused};
+use crate::simd::{Number, Simd, dispatch};
 
 /// Rows and columns of a tile.
 pub(super) const TILE: usize = 4;
@@ -37,16 +37,19 @@ pub(super) fn entry(i: usize, j: usize) -> usize {
 
 /// Writes the whole matrix in panels of `height` rows, a multiple of four.
 #[inline(always)]
-pub(super) fn expand<V: Registers>(tiles: usize, height: usize, triangle: &[f64], panels: &mut [f64]) {
+pub(super) fn expand<V: Simd>(tiles: usize, height: usize, triangle: &[f64], panels: &mut [f64]) {
     let panels = panels.as_chunks_mut::<TILE>().0.as_chunks_mut::<PANEL>().0;
     let mut rest = triangle.as_chunks::<TILE>().0.as_chunks::<TILE>().0.iter();
     let height = height / TILE;
     for i in 0..tiles {
         for (j, tile) in rest.by_ref().take(i + 1).enumerate() {
-            let tile = tile.each_ref().map(V::Four::load);
-            put::<V>(tile, &mut panels[j / 2 * height + i], j % 2);
+            let mut rows = [V::Four::splat(0.0); TILE];
+            for r in 0..TILE {
+                rows[r] = V::Four::load(&tile[r]);
+            }
+            put::<V>(rows, &mut panels[j / 2 * height + i], j % 2);
             if j < i {
-                put::<V>(V::transpose(tile), &mut panels[i / 2 * height + j], i % 2);
+                put::<V>(V::transpose(rows), &mut panels[i / 2 * height + j], i % 2);
             }
         }
     }
@@ -54,13 +57,13 @@ pub(super) fn expand<V: Registers>(tiles: usize, height: usize, triangle: &[f64]
 
 /// Writes a tile into the left or the right half of four rows of a panel.
 #[inline(always)]
-fn put<V: Registers>(tile: [V::Four; TILE], rows: &mut [[f64; TILE]; PANEL], half: usize) {
+fn put<V: Simd>(tile: [V::Four; TILE], rows: &mut [[f64; TILE]; PANEL], half: usize) {
     for r in 0..TILE {
         tile[r].store(&mut rows[2 * r + half]);
     }
 }
 
-fused! {
+dispatch! {
     /// Writes the N × N matrix. `panels` is work space.
     pub(super) fn unpack<V>(n: usize, triangle: &[f64], panels: &mut Vec<f64>, out: &mut [f64]) {
         let (tiles, height) = (tiles(n), n.next_multiple_of(TILE));
@@ -69,7 +72,7 @@ fused! {
         for (s, panel) in panels.as_chunks::<PANEL>().0.chunks_exact(height).enumerate() {
             for (row, out) in panel.iter().zip(out.chunks_exact_mut(n)) {
                 let out = &mut out[s * PANEL..];
-                if let Some(out) = out.first_chunk_mut() {
+                if let Some(out) = out.first_chunk_mut::<PANEL>() {
                     V::Eight::load(row).store(out);
                 } else {
                     for (out, x) in out.iter_mut().zip(row) {
@@ -84,7 +87,7 @@ fused! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::width::Width;
+    use crate::simd::Width;
 
     /// Entry (i, j) of the matrix is entry (max, min) of the triangle, for every width.
     #[test]

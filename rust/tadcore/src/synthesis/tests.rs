@@ -4,7 +4,7 @@ use super::newton::{Layout, Objective, Variable, packed};
 use super::theta::{Doubled, RealGains};
 use super::*;
 use crate::game::Interaction;
-use crate::width::Width;
+use crate::simd::Width;
 
 mod descents;
 mod kinds;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::ensemble::anysize::observe_any;
 use crate::network::{self, Topology, squared_reach};
+use crate::simd::{Baseline, Width};
 use crate::simulation::Reach;
 
 /// Points whose distances are whole numbers, on the rims of whole radii: as one run sees and ends them.
@@ -20,8 +21,8 @@ fn rims_belong_to_the_balls_at_every_size() {
         let capture: Vec<Lane> = (0..3).map(|i| std::array::from_fn(|l| radius(l, i + 2))).collect();
         let mut keys = vec![[0; LANES]];
         let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
-        let (compiled, ends) = observe::<Plain, 3, 2, 2>(&z, &sight, &capture);
-        assert_eq!((keys[0], caught), (compiled, u32::from(ends)));
+        let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture);
+        assert_eq!((keys[0], caught), (Baseline::keys(compiled), u32::from(ends)));
         // With nothing on the shelf a sweep stops with what it saw, or with whom it caught.
         let nothing = [-1.0; LANES];
         for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
@@ -30,7 +31,7 @@ fn rims_belong_to_the_balls_at_every_size() {
                 let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
                 let mut strips = Strips { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
                 let mut seen = vec![[0; LANES]];
-                let stop = sweep_of(&shape, width)(&shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
+                let stop = sweep_of(&shape)(width, &shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
                 assert_eq!(stop, expected, "{width:?}");
                 assert!(caught != 0 || seen == keys, "{width:?}");
             }
@@ -70,8 +71,8 @@ fn blocks_stop_where_single_strips_do() {
         let (mut keys, mut expected) = (vec![[0; LANES]], vec![[0; LANES]]);
         let (mut from, mut counts) = (0, [0; 2]);
         loop {
-            let stop = sweep_of(&shape, width)(&shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
-            assert_eq!(stop, sweep_any(&shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
+            let stop = sweep_of(&shape)(width, &shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
+            assert_eq!(stop, sweep_any(width, &shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
             assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
             match stop {
                 Stop::End => break,

@@ -13,12 +13,10 @@
 use faer::linalg::cholesky::ldlt::factor;
 use faer::{MatMut, Par};
 
-#[cfg(target_arch = "x86_64")]
-use super::factor_avx2;
+use super::factor_one::factorise_one;
 use super::layout::{GROUP, Layout, packed};
 use super::tile::{Pivots, diagonal, tile};
-use crate::lanes::Number;
-use crate::width::Width;
+use crate::simd::{Number, Width};
 
 /// Unknowns from which faer's factorisation may be used.
 const LIBRARY_SIZE: usize = 512;
@@ -28,7 +26,7 @@ const LIBRARY_SIZE: usize = 512;
 pub(crate) struct Means {
     /// faer, on large matrices; its bits differ from those of the loops here.
     pub library: bool,
-    /// Registers, with the same bits; only where the processor has AVX2 and FMA.
+    /// Registers, with the same bits.
     pub width: Width,
 }
 
@@ -44,7 +42,7 @@ pub(crate) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, mean
         let (definite, lack) = if means.library && d >= LIBRARY_SIZE {
             (factorise_large(h, damping, used, d, f), 0.0)
         } else {
-            factorise_alone(h, damping, used, d, means.width, f)
+            factorise_one(means.width, h, damping, used, d, f)
         };
         return (T::mask(u16::from(definite)), T::splat(lack));
     }
@@ -54,26 +52,6 @@ pub(crate) fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, mean
         factorise_columns(h, damping, first, active, f, d, &mut pivots);
     }
     (T::mask(pivots.ok), pivots.lack)
-}
-
-/// The same for one matrix, whose empty unknowns are those from `used` on.
-fn factorise_alone(h: &[f64], damping: f64, used: usize, d: usize, width: Width, f: &mut [f64]) -> (bool, f64) {
-    #[cfg(target_arch = "x86_64")]
-    if width != Width::Baseline {
-        debug_assert!(std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma"));
-        // SAFETY: the other widths exist only where the processor said that it has AVX2 and FMA.
-        return unsafe { factor_avx2::factorise(h, damping, used, d, f) };
-    }
-    debug_assert!(width == Width::Baseline);
-    let mut pivots = Pivots::new();
-    for first in (0..d).step_by(GROUP) {
-        let active = std::array::from_fn(|j| first + j < used);
-        factorise_columns(h, damping, first, active, f, d, &mut pivots);
-        if pivots.ok & 1 == 0 {
-            break;
-        }
-    }
-    (pivots.ok & 1 == 1, pivots.lack)
 }
 
 /// The columns of one tile.

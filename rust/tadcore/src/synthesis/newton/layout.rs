@@ -1,7 +1,7 @@
 //! The unknowns of several networks side by side, and forms on the gains restricted to them.
 
 use super::variables::Variable;
-use crate::lanes::Number;
+use crate::simd::Number;
 
 /// Unknowns come in groups of this size, that factorisations take at once: the last are filled up with empty ones.
 pub(crate) const GROUP: usize = 4;

@@ -14,7 +14,7 @@ use super::factor::{self, Means};
 use super::layout::{Form, packed};
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
-use crate::lanes::{Number, dot_in_order, take};
+use crate::simd::{Number, dot_in_order, take};
 
 /// A function of gains laid out as one vector of `width` entries, and the form that its Hessian is.
 pub(crate) trait Objective<T: Number>: Form<T> {

@@ -6,14 +6,13 @@
 //! |---|---|
 //! | `variables` | directions in the space of the gains |
 //! | `layout` | the unknowns of several descents side by side; forms restricted to them |
-//! | `tile`, `factor`, `factor_avx2` | factorisation of small symmetric matrices, and the solves that go with it |
+//! | `tile`, `factor`, `factor_one` | factorisation of small symmetric matrices, and the solves that go with it |
 //! | `tasks` | lists of descents: where they start, what they reached |
 //! | `workspace` | scratch memory |
 //! | `minimise` | the descents |
 
 mod factor;
-#[cfg(target_arch = "x86_64")]
-mod factor_avx2;
+mod factor_one;
 mod layout;
 mod minimise;
 mod tasks;

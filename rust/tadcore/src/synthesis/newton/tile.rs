@@ -1,7 +1,7 @@
 //! Tiles of 4 × 4 entries of a symmetric matrix, and its pivots.
 
 use super::layout::{GROUP, packed};
-use crate::lanes::Number;
+use crate::simd::Number;
 
 /// A tile.
 pub(super) type Tile<T> = [[T; GROUP]; GROUP];

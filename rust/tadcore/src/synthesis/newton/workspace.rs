@@ -1,7 +1,7 @@
 //! Scratch that is reused from solve to solve.
 
 use super::layout::{GROUP, Layout, packed};
-use crate::lanes::Number;
+use crate::simd::Number;
 
 /// The memory of descents side by side.
 #[derive(Debug)]

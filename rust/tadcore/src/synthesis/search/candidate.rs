@@ -1,6 +1,6 @@
 //! A network that is being solved: its variables, the best gains found so far, and the look that found them.
 
-use crate::lanes::norm;
+use crate::simd::norm;
 use crate::synthesis::newton::{Owner, Reached, Rival, Variable};
 
 /// The look that won.

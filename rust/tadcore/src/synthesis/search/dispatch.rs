@@ -4,12 +4,11 @@
 //! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
 //! leave the first cache side by side, and go one at a time.
 
-use crate::lanes::Number;
-#[cfg(target_arch = "x86_64")]
-use crate::lanes::{Eight, Eight32, Sixteen32, Wide, Wide32};
+use std::any::Any;
+
+use crate::simd::{Number, Simd, Width, dispatch, widened};
 use crate::synthesis::newton::{Limits, Means, Objective, Owner, Tasks, Workspace, factorise, minimise};
 use crate::synthesis::theta::{Certificate, Doubled, Parts, Problem, RealGains};
-use crate::width::Width;
 
 /// N up to which there is a version with constant loop bounds.
 pub(crate) const CONSTANT_UP_TO: usize = 8;
@@ -33,27 +32,30 @@ pub(crate) enum Kind {
     Doubled,
 }
 
-/// The scratch of the widths in use.
+/// Runs lists at one width.
 #[derive(Debug)]
 pub(crate) struct Engine {
     width: Width,
-    one: Workspace<f64>,
-    one32: Workspace<f32>,
-    #[cfg(target_arch = "x86_64")]
-    wide: Workspace<Wide>,
-    #[cfg(target_arch = "x86_64")]
-    wide32: Workspace<Wide32>,
-    #[cfg(target_arch = "x86_64")]
-    eight: Workspace<Eight>,
-    #[cfg(target_arch = "x86_64")]
-    eight32: Workspace<Eight32>,
-    #[cfg(target_arch = "x86_64")]
-    sixteen32: Workspace<Sixteen32>,
+    scratch: Scratch,
 }
 
 impl Default for Engine {
     fn default() -> Self {
-        Self::of(Width::detect())
+        Self::of(Width::in_use())
+    }
+}
+
+/// Scratch memory for each kind of number in use, made when it is first asked for.
+#[derive(Debug, Default)]
+struct Scratch(Vec<Box<dyn Any + Send>>);
+
+impl Scratch {
+    fn of<T: Number>(&mut self) -> &mut Workspace<T> {
+        let at = self.0.iter().position(|held| held.is::<Workspace<T>>()).unwrap_or_else(|| {
+            self.0.push(Box::<Workspace<T>>::default());
+            self.0.len() - 1
+        });
+        self.0[at].downcast_mut().unwrap_or_else(|| unreachable!("found by its type"))
     }
 }
 
@@ -69,21 +71,7 @@ struct List<'a> {
 impl Engine {
     /// An engine of a width that the processor has.
     pub(crate) fn of(width: Width) -> Self {
-        Self {
-            width,
-            one: Workspace::default(),
-            one32: Workspace::default(),
-            #[cfg(target_arch = "x86_64")]
-            wide: Workspace::default(),
-            #[cfg(target_arch = "x86_64")]
-            wide32: Workspace::default(),
-            #[cfg(target_arch = "x86_64")]
-            eight: Workspace::default(),
-            #[cfg(target_arch = "x86_64")]
-            eight32: Workspace::default(),
-            #[cfg(target_arch = "x86_64")]
-            sixteen32: Workspace::default(),
-        }
+        Self { width, scratch: Scratch::default() }
     }
 
     /// Makes the descents of `tasks`.
@@ -97,69 +85,26 @@ impl Engine {
     ) {
         let means = Means { library: problem.size > CONSTANT_UP_TO, width: self.width };
         let mut list = List { kind, tasks, owners, limits, means };
+        let (width, scratch) = (self.width, &mut self.scratch);
+        let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
         match (kind, single::<N>(problem)) {
-            (Kind::Scout | Kind::Doubled, Some(parts)) => self.run_single::<N>(parts, &mut list),
-            _ => self.run_double::<N>(&problem.double, &mut list),
-        }
-    }
-
-    fn run_double<const N: usize>(&mut self, parts: &Parts<f64>, list: &mut List) {
-        #[cfg(target_arch = "x86_64")]
-        if const { side_by_side(N) } && list.tasks.len() >= SIDE_BY_SIDE_FROM && list.kind != Kind::Doubled {
-            match self.width {
-                Width::Baseline => {}
-                Width::Avx2 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("fma"));
-                    // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
-                    return unsafe { real_avx2::<N>(parts, list, &mut self.wide) };
+            (Kind::Scout | Kind::Doubled, Some(parts)) => {
+                if const { side_by_side(N) } && several {
+                    return several_single::<N>(width, parts, &mut list, scratch);
                 }
-                Width::Avx512 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
-                    // SAFETY: this variant exists only where the processor said that it has AVX-512F, VL and FMA.
-                    return unsafe { real_avx512::<N>(parts, list, &mut self.eight) };
+                one_single(width, parts, &mut list, scratch);
+            }
+            _ => {
+                if const { side_by_side(N) } && several && kind != Kind::Doubled {
+                    return several_double::<N>(width, &problem.double, &mut list, scratch);
                 }
+                // Doubled gains only where single precision cannot hold the problem: one version for all small sizes.
+                if const { side_by_side(N) } && kind == Kind::Doubled {
+                    return one_double::<0>(width, &problem.double, &mut list, scratch);
+                }
+                one_double::<N>(width, &problem.double, &mut list, scratch);
             }
         }
-        // Every width gives the same bits; where the processor has only the target's, one version for all sizes will do.
-        #[cfg(target_arch = "x86_64")]
-        if self.width == Width::Baseline {
-            return any_size(parts, list, &mut self.one);
-        }
-        debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
-        // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
-        unsafe { one::<N>(parts, list, &mut self.one) }
-    }
-
-    fn run_single<const N: usize>(&mut self, parts: &Parts<f32>, list: &mut List) {
-        #[cfg(target_arch = "x86_64")]
-        if const { side_by_side(N) } && list.tasks.len() >= SIDE_BY_SIDE_FROM {
-            match self.width {
-                Width::Baseline => {}
-                Width::Avx2 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("fma"));
-                    // SAFETY: this variant exists only where the processor said that it has AVX2 and FMA.
-                    return unsafe { single_avx2::<N>(parts, list, &mut self.wide32) };
-                }
-                Width::Avx512 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("avx512vl"));
-                    // SAFETY: this variant exists only where the processor said that it has AVX-512F, VL and FMA.
-                    return unsafe {
-                        if list.kind == Kind::Doubled {
-                            doubled_avx512::<N>(parts, list, &mut self.eight32)
-                        } else {
-                            scouts_avx512::<N>(parts, list, &mut self.sixteen32)
-                        }
-                    };
-                }
-            }
-        }
-        #[cfg(target_arch = "x86_64")]
-        if self.width == Width::Baseline {
-            return any_size(parts, list, &mut self.one32);
-        }
-        debug_assert!(self.width != Width::Baseline || cfg!(not(target_arch = "x86_64")));
-        // SAFETY: on x86-64 the other widths exist only where the processor said that it has AVX2 and FMA.
-        unsafe { one32(parts, list, &mut self.one32) }
     }
 }
 
@@ -173,71 +118,59 @@ pub(crate) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
     problem.single.as_ref().filter(|_| side_by_side(N))
 }
 
-/// One descent after another by the target's own instructions, one version for all sizes.
-#[cfg(target_arch = "x86_64")]
+// Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+
+dispatch! {
+    /// As many descents side by side as a register holds.
+    fn several_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+        if const { V::SIZED } {
+            descend::<V::Double, N>(parts, list, scratch.of());
+        } else {
+            any_size::<f64>(parts, list, scratch.of());
+        }
+    }
+}
+
+dispatch! {
+    /// The same in single precision.
+    fn several_single<V, const N: usize>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+        if const { !V::SIZED } {
+            any_size::<f32>(parts, list, scratch.of());
+        } else if list.kind == Kind::Doubled {
+            descend_doubled::<V::Half, N>(parts, list, scratch.of());
+        } else {
+            descend::<V::Single, N>(parts, list, scratch.of());
+        }
+    }
+}
+
+widened! {
+    /// One descent after another.
+    fn one_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+        if const { !V::SIZED } {
+            any_size::<f64>(parts, list, scratch.of());
+        } else if const { side_by_side(N) } || list.kind != Kind::Doubled {
+            descend::<f64, N>(parts, list, scratch.of());
+        } else {
+            descend_doubled::<f64, N>(parts, list, scratch.of());
+        }
+    }
+}
+
+widened! {
+    /// The same in single precision: seldom enough for one version for all sizes.
+    fn one_single<V>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+        if const { V::SIZED } {
+            run::<f32, 0>(parts, list, scratch.of());
+        } else {
+            any_size::<f32>(parts, list, scratch.of());
+        }
+    }
+}
+
 #[inline(never)]
 fn any_size<T: Number>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
     run::<T, 0>(parts, list, w);
-}
-
-/// One descent after another.
-///
-/// # Safety
-/// On x86-64 the processor must have AVX2 and FMA.
-#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-unsafe fn one<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<f64>) {
-    if list.kind != Kind::Doubled {
-        descend::<f64, N>(parts, list, w);
-    } else if const { side_by_side(N) } {
-        // Only where single precision cannot hold the problem.
-        // SAFETY: as promised to this function.
-        unsafe { one::<0>(parts, list, w) }
-    } else {
-        descend_doubled::<f64, N>(parts, list, w);
-    }
-}
-
-/// The same in single precision: seldom enough for one version for all sizes.
-///
-/// # Safety
-/// On x86-64 the processor must have AVX2 and FMA.
-#[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
-unsafe fn one32(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<f32>) {
-    run::<f32, 0>(parts, list, w);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn real_avx2<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<Wide>) {
-    descend::<Wide, N>(parts, list, w);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn single_avx2<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Wide32>) {
-    match list.kind {
-        Kind::Doubled => descend_doubled::<Wide32, N>(parts, list, w),
-        _ => descend::<Wide32, N>(parts, list, w),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,fma")]
-fn real_avx512<const N: usize>(parts: &Parts<f64>, list: &mut List, w: &mut Workspace<Eight>) {
-    descend::<Eight, N>(parts, list, w);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,fma")]
-fn scouts_avx512<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Sixteen32>) {
-    descend::<Sixteen32, N>(parts, list, w);
-}
-
-/// Eight at a time: the Hessian of sixteen would not stay in the first cache.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl,fma")]
-fn doubled_avx512<const N: usize>(parts: &Parts<f32>, list: &mut List, w: &mut Workspace<Eight32>) {
-    descend_doubled::<Eight32, N>(parts, list, w);
 }
 
 #[inline(always)]

@@ -5,7 +5,7 @@
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
 //! starts canonically, ends at a stationary point near its start, and does not look further.
 
-use crate::lanes::norm;
+use crate::simd::norm;
 use crate::synthesis::newton::{Layout, Limits, Objective, Reached, Variable};
 use crate::synthesis::theta::{Problem, RealGains};
 

@@ -2,7 +2,7 @@
 
 use super::candidate::{BACK, Entry, Look};
 use super::dispatch::{self, Engine, Kind};
-use crate::lanes::norm;
+use crate::simd::norm;
 use crate::synthesis::newton::{Limits, Owner, Tasks, advance, balance};
 use crate::synthesis::theta::Problem;
 

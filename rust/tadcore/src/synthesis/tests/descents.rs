@@ -4,7 +4,7 @@
 use super::super::newton::{Form, Means, Owner, Reached, Rival, Slot, Workspace, advance, minimise};
 use super::super::search::{canonical, variables};
 use super::*;
-use crate::lanes::norm;
+use crate::simd::norm;
 
 pub(super) const MEANS: Means = Means { library: false, width: Width::Baseline };
 pub(super) const LIMITS: Limits =

@@ -4,7 +4,7 @@ use super::super::newton::{Owner, Rival, Workspace, balance, minimise};
 use super::super::search::variables;
 use super::descents::{LIMITS, MEANS, descend, each};
 use super::*;
-use crate::lanes::norm;
+use crate::simd::norm;
 
 /// Whether single precision settles a descent from `start` beside a rival, and in how many steps it ends.
 fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival, iterations: usize) -> (bool, usize) {

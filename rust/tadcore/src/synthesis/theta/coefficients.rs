@@ -1,6 +1,6 @@
 //! What Θ is made of, in the precision of a kernel.
 
-use crate::lanes::Scalar;
+use crate::simd::Scalar;
 
 /// The numbers of one instant: the symbols of [`super::problem`].
 #[derive(Debug, Clone, PartialEq)]

@@ -19,7 +19,7 @@
 
 use super::coefficients::Parts;
 use super::real::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
-use crate::lanes::{Number, dot, norm, sum_of_squares, take};
+use crate::simd::{Number, dot, norm, sum_of_squares, take};
 use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over doubled gains.

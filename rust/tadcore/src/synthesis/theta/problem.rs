@@ -13,7 +13,7 @@
 
 use super::coefficients::{Parts, Scale};
 use crate::game::{Game, Interaction};
-use crate::lanes::{norm, sum_of_squares};
+use crate::simd::{norm, sum_of_squares};
 
 /// Everything Θ needs to know of one instant t_k.
 #[derive(Debug, Clone, PartialEq)]

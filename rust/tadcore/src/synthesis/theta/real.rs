@@ -13,7 +13,7 @@
 //! Gauss–Newton part: one more factorisation proves what no number of restarts can.
 
 use super::coefficients::Parts;
-use crate::lanes::{Number, Scalar, dot, norm, sum_of_squares, take};
+use crate::simd::{Number, Scalar, dot, norm, sum_of_squares, take};
 use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over gains, for one network or several side by side. `N` is the size, 0 when it is known only at run time.

@@ -1,7 +1,6 @@
 //! Each operation, lane by lane, against the same one on numbers by themselves.
 
 use super::*;
-use crate::width::Width;
 
 /// Pairs of them are in any order, equal, of both signs, zero, and no numbers; all are numbers of single precision.
 const NUMBERS: [f64; 11] =
@@ -39,6 +38,10 @@ fn check<T: Number>() {
             let all = ((1_u32 << T::LANES) - 1) as u16;
             assert_eq!(T::bits(T::mask(mask)) & all, mask & all);
             assert_eq!((less | at_most) & !all, 0);
+            let mut stored = vec![T::Scalar::of(0.0); T::LANES + 1];
+            x.store(&mut stored);
+            let loaded = T::load(&stored);
+            (0..T::LANES).for_each(|lane| assert!(same(loaded.lane(lane), x.lane(lane))));
             for lane in 0..T::LANES {
                 let (p, u, v) = (a.lane(lane), x.lane(lane), y.lane(lane));
                 assert!(same(u, NUMBERS[(2 * from + lane * step) % NUMBERS.len()]));
@@ -84,23 +87,44 @@ fn check<T: Number>() {
     }
 }
 
+dispatch! {
+    fn check_width<V>() {
+        check::<V::Four>();
+        check::<V::Eight>();
+        check::<V::Double>();
+        check::<V::Single>();
+        check::<V::Half>();
+        check_whole::<V>();
+    }
+}
+
+/// What is not done lane by lane, against the same by indices.
+fn check_whole<V: Simd>() {
+    let numbers: [f64; 16] = std::array::from_fn(|i| (1.0 + i as f64).sqrt());
+    let rows = std::array::from_fn(|r| V::Four::load(&numbers[4 * r..]));
+    for (c, column) in V::transpose(rows).into_iter().enumerate() {
+        (0..4).for_each(|r| assert_eq!(column.lane(r), numbers[4 * r + c]));
+    }
+    for (h, half) in V::halves(V::Eight::load(&numbers)).into_iter().enumerate() {
+        (0..4).for_each(|c| assert_eq!(half.lane(c), numbers[4 * h + c]));
+    }
+    let (mut keys, mut expected) = (V::no_keys(), [0_u64; 8]);
+    for (bit, lanes) in [(1 << 3, 0b1010_0110), (1 << 15, 0b0111_0001), (1, 0), (1 << 3, 0b0000_1111)] {
+        keys = V::set(keys, bit, V::Eight::mask(lanes));
+        (0..8).filter(|lane| lanes >> lane & 1 == 1).for_each(|lane| expected[lane] |= bit);
+    }
+    assert_eq!(V::keys(keys), expected);
+    let low = V::low(keys);
+    (0..8).for_each(|lane| assert_eq!(low[lane / 4] >> (16 * (lane % 4)) & 0xFFFF, expected[lane]));
+    let keys = V::set(keys, 1 << 40, V::Eight::mask(0b1000_0001));
+    assert_eq!(V::keys(keys), std::array::from_fn(|l| expected[l] | if l % 7 == 0 { 1 << 40 } else { 0 }));
+}
+
 #[test]
 fn a_lane_does_what_a_number_alone_does() {
     check::<f64>();
     check::<f32>();
-    #[cfg(target_arch = "x86_64")]
     for width in Width::all() {
-        match width {
-            Width::Baseline => {}
-            Width::Avx2 => {
-                check::<Wide>();
-                check::<Wide32>();
-            }
-            Width::Avx512 => {
-                check::<Eight>();
-                check::<Eight32>();
-                check::<Sixteen32>();
-            }
-        }
+        check_width(width);
     }
 }

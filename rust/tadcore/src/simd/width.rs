@@ -1,7 +1,4 @@
-//! How wide the processor's vectors are: hot loops are compiled for each width, and the processor decides at run time.
-//!
-//! Only the width differs: the operations and their order are the same, so every width gives the same bits. In
-//! `widened!` no operation is fused with another.
+//! How wide the processor's vectors are.
 //!
 //! The environment variable `TADCORE_SIMD` (`baseline`, `avx2` or `avx512`) chooses a width below the widest, for tests
 //! and benches. It is read once; what is no width, or none of this processor, is refused when a game is made.
@@ -48,7 +45,7 @@ impl Width {
     ///
     /// # Panics
     /// When `TADCORE_SIMD` cannot be followed and there is no game.
-    pub(crate) fn detect() -> Self {
+    pub(crate) fn in_use() -> Self {
         #[expect(clippy::panic, reason = "without a game nothing else can refuse, and nothing may ignore it")]
         Self::chosen().unwrap_or_else(|error| panic!("{error}"))
     }
@@ -83,54 +80,31 @@ impl Width {
 
     /// Every width that this processor has, the narrowest first.
     pub(crate) fn all() -> Vec<Self> {
-        let mut all = vec![Self::Baseline];
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            all.push(Self::Avx2);
-            if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
-                all.push(Self::Avx512);
-            }
-        }
-        all
-    }
-}
-
-/// Asks for the cache line of `data[i]`, if there is one, before it is needed.
-#[inline(always)]
-pub(crate) fn prefetch<T>(data: &[T], i: usize) {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(x) = data.get(i) {
-        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        // SAFETY: SSE is part of x86-64; a prefetch reads nothing that the program sees, and the address is a reference's.
-        unsafe { _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(x).cast()) }
-    }
-}
-
-/// Defines a function by a body compiled for 128 and for 256 bits; wider registers did not pay in these loops.
-macro_rules! widened {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident $(<$(const $g:ident: usize),*>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? $body:block) => {
-        $(#[$doc])*
-        $vis fn $name $(<$(const $g: usize),*>)? (width: $crate::width::Width, $($arg: $ty),*) $(-> $ret)? {
-            #[inline(always)]
-            fn body $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? $body
+        let known = [
+            Self::Baseline,
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2 $(<$(const $g: usize),*>)? ($($arg: $ty),*) $(-> $ret)? {
-                body $(::<$($g),*>)? ($($arg),*)
-            }
-            match width {
-                $crate::width::Width::Baseline => body $(::<$($g),*>)? ($($arg),*),
-                #[cfg(target_arch = "x86_64")]
-                $crate::width::Width::Avx2 | $crate::width::Width::Avx512 => {
-                    debug_assert!(std::arch::is_x86_feature_detected!("avx2"));
-                    // SAFETY: these variants exist only where the processor said that it has AVX2.
-                    unsafe { avx2 $(::<$($g),*>)? ($($arg),*) }
-                }
+            Self::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512,
+        ];
+        known.into_iter().filter(|width| width.is_there()).collect()
+    }
+
+    /// Whether this processor has it.
+    pub(crate) fn is_there(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_there()
+                    && std::arch::is_x86_feature_detected!("avx512f")
+                    && std::arch::is_x86_feature_detected!("avx512vl")
             }
         }
-    };
+    }
 }
-pub(crate) use widened;
 
 #[cfg(test)]
 mod tests {

@@ -1,17 +1,12 @@
-//! Numbers side by side: one, or four to sixteen in each vector register, in double or in single precision.
+//! Numbers side by side: one, or two to sixteen in each vector register, in double or in single precision.
 //!
 //! What is written once over [`Number`] runs for one problem or for several at a time. Every operation is the IEEE one on
-//! each lane, the fused ones too, so a lane gives the bits that the number alone would give. The methods of the wide
-//! types are inlined into functions that are compiled for their instructions; a closure is a function of its own and is
-//! not, so kernels over `Number` are plain loops.
-
-#[cfg(target_arch = "x86_64")]
-mod x86;
+//! each lane, the fused ones too, so a lane gives the bits that the number alone would give. The methods of registers
+//! are inlined into functions that are compiled for their instructions; a closure is a function of its own and is not,
+//! so kernels over `Number` are plain loops. Without a fused instruction (an x86-64 processor older than 2013) a fused
+//! operation is a slow call of the library.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
-
-#[cfg(target_arch = "x86_64")]
-pub(crate) use x86::{Eight, Eight32, Sixteen32, Wide, Wide32, transpose};
 
 /// A precision.
 pub(crate) trait Scalar: Copy + std::fmt::Debug + Mul<Output = Self> + Neg<Output = Self> {
@@ -19,23 +14,16 @@ pub(crate) trait Scalar: Copy + std::fmt::Debug + Mul<Output = Self> + Neg<Outpu
     fn of(x: f64) -> Self;
 }
 
-impl Scalar for f64 {
-    #[inline(always)]
-    fn of(x: f64) -> f64 {
-        x
-    }
-}
-
-impl Scalar for f32 {
-    #[inline(always)]
-    fn of(x: f64) -> f32 {
-        x as f32
-    }
-}
-
 /// One number, or several side by side.
 pub(crate) trait Number:
-    Copy + std::fmt::Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy
+    + std::fmt::Debug
+    + Send
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
 {
     /// How many, at most sixteen.
     const LANES: usize;
@@ -44,14 +32,16 @@ pub(crate) trait Number:
     /// The precision.
     type Scalar: Scalar;
     /// A yes or no for each lane.
-    type Mask: Copy + std::fmt::Debug;
+    type Mask: Copy + std::fmt::Debug + Send + 'static;
 
     /// The same number in all lanes.
     fn all(x: Self::Scalar) -> Self;
+    /// The first numbers of a slice, one for each lane.
+    fn load(from: &[Self::Scalar]) -> Self;
+    /// Writes the first numbers of a slice.
+    fn store(self, to: &mut [Self::Scalar]);
     /// The number in one lane.
     fn lane(&self, lane: usize) -> f64;
-    /// Replaces the number in one lane.
-    fn set_lane(&mut self, lane: usize, x: f64);
     /// self + x·y, rounded once.
     fn plus(self, x: Self, y: Self) -> Self;
     /// self − x·y, rounded once.
@@ -64,7 +54,7 @@ pub(crate) trait Number:
     fn at_most(self, other: Self) -> Self::Mask;
     /// `yes` where the mask says so, elsewhere `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// A mask from its bits, lane 0 the lowest.
+    /// A mask from its bits, lane 0 the lowest; those past the last lane are not read.
     fn mask(bits: u16) -> Self::Mask;
     /// A mask as bits.
     fn bits(mask: Self::Mask) -> u16;
@@ -81,6 +71,12 @@ pub(crate) trait Number:
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Self::all(Self::Scalar::of(x))
+    }
+
+    /// Replaces the number in one lane.
+    #[inline(always)]
+    fn set_lane(&mut self, lane: usize, x: f64) {
+        *self = Self::select(Self::mask(1 << lane), Self::splat(x), *self);
     }
 
     /// The distance from 1 to the next number.
@@ -152,78 +148,3 @@ pub(crate) fn take<T: Number>(lanes: T::Mask, from: &[T], to: &mut [T]) {
         *to = T::select(lanes, x, *to);
     }
 }
-
-/// One number.
-macro_rules! alone {
-    ($type:ident, $single:literal, $alone:expr, $alone_mut:expr) => {
-        impl Number for $type {
-            const LANES: usize = 1;
-            const SINGLE: bool = $single;
-            type Scalar = $type;
-            type Mask = bool;
-
-            #[inline(always)]
-            fn all(x: $type) -> $type {
-                x
-            }
-            #[inline(always)]
-            fn lane(&self, _lane: usize) -> f64 {
-                f64::from(*self)
-            }
-            #[inline(always)]
-            fn set_lane(&mut self, _lane: usize, x: f64) {
-                *self = Scalar::of(x);
-            }
-            #[inline(always)]
-            fn plus(self, x: $type, y: $type) -> $type {
-                x.mul_add(y, self)
-            }
-            #[inline(always)]
-            fn minus(self, x: $type, y: $type) -> $type {
-                (-x).mul_add(y, self)
-            }
-            #[inline(always)]
-            fn sqrt(self) -> $type {
-                $type::sqrt(self)
-            }
-            #[inline(always)]
-            fn abs(self) -> $type {
-                $type::abs(self)
-            }
-            #[inline(always)]
-            fn less(self, other: $type) -> bool {
-                self < other
-            }
-            #[inline(always)]
-            fn at_most(self, other: $type) -> bool {
-                self <= other
-            }
-            #[inline(always)]
-            fn select(mask: bool, yes: $type, no: $type) -> $type {
-                if mask { yes } else { no }
-            }
-            #[inline(always)]
-            fn mask(bits: u16) -> bool {
-                bits & 1 == 1
-            }
-            #[inline(always)]
-            fn bits(mask: bool) -> u16 {
-                u16::from(mask)
-            }
-            #[inline(always)]
-            fn alone(numbers: &[$type]) -> Option<&[f64]> {
-                $alone(numbers)
-            }
-            #[inline(always)]
-            fn alone_mut(numbers: &mut [$type]) -> Option<&mut [f64]> {
-                $alone_mut(numbers)
-            }
-        }
-    };
-}
-
-alone!(f64, false, Some, Some);
-alone!(f32, true, |_| None, |_| None);
-
-#[cfg(test)]
-mod tests;

@@ -1,0 +1,73 @@
+"""The mutants of the vector instructions; `listed.py` says how to read a row."""
+
+MUTANTS = {
+    "simd/number.rs": [
+        ("Σxy, second of four sums", "s1 = «s1.plus(x[i + 1], y[i + 1])»;", "s1.minus(x[i + 1], y[i + 1])"),
+        ("Σxy, the rest", "while i < len {\n        s0 = «s0.plus(x[i], y[i])»;", "s0.minus(x[i], y[i])"),
+        ("Σxy, all four", "(s0 + s1) + («s2 + s3»)", "s2 - s3"),
+        ("the larger one", "Self::select(«self.less(other)», other, self)", "other.less(self)"),
+        ("Σxy in order", "sum = «sum.plus(x, y)»;", "sum.minus(x, y)"),
+        ("to := from", "«T::select(lanes, x, *to)»", "x"),
+        ("one lane", "«Self::mask(1 << lane)»", "Self::mask(1)"),
+    ],
+    "simd/one.rs": [
+        ("one: a + xy", "«x.mul_add(y, self)»", "x.mul_add(self, y)"),
+        ("one: a − xy", "«(-x).mul_add(y, self)»", "x.mul_add(y, self)"),
+        ("one: a < b", "«self < other»", "self > other"),
+        ("one: a ≤ b", "«self <= other»", "self < other"),
+        ("one: selection", "if mask { «yes» } else { no }", "no"),
+    ],
+    "simd/group.rs": [
+        ("group: a − b, a / b", "«self.0[i] $operator other.0[i]»", "other.0[i] $operator self.0[i]"),
+        ("group: a + xy", "«self.0[i].plus(x.0[i], y.0[i])»", "self.0[i].minus(x.0[i], y.0[i])"),
+        ("group: a − xy", "«self.0[i].minus(x.0[i], y.0[i])»", "self.0[i].plus(x.0[i], y.0[i])"),
+        ("group: load", "&from[«i * T::LANES»..]", "0"),
+        ("group: store", "&mut to[«i * T::LANES»..]", "0"),
+        ("group: lane", "self.0[«lane / T::LANES»]", "0"),
+        ("group: a < b", "mask[i] = «self.0[i].less(other.0[i])»;", "other.0[i].less(self.0[i])"),
+        ("group: a ≤ b", "mask[i] = «self.0[i].at_most(other.0[i])»;", "self.0[i].less(other.0[i])"),
+        ("group: selection", "T::select(mask[i], «yes.0[i]», no.0[i])", "no.0[i]"),
+        ("group: mask", "T::mask(«bits >> (i * T::LANES)»)", "bits"),
+        ("group: bits", "bits |= «T::bits(mask[i]) << (i * T::LANES)»;", "T::bits(mask[i])"),
+    ],
+    "simd/instructions.rs": [
+        ("baseline: transpose", "«rows[r].0[c]»", "rows[c].0[r]"),
+        ("baseline: halves", "eight[«4 * h + c»]", "4 * (1 - h) + c"),
+        ("baseline: keys", "if «lanes[l]» { bit }", "lanes[7 - l]"),
+        ("low parts of keys", "(keys[first + l] & 0xFFFF) << («16 * l»)", "16 * (3 - l)"),
+    ],
+    "simd/register.rs": [
+        ("registers: a − b, a / b", "unsafe { Self(«$of(self.0, other.0)») }", "$of(other.0, self.0)"),
+        ("registers: a + xy", "unsafe { Self(«$plus(x.0, y.0, self.0)») }", "$minus(x.0, y.0, self.0)"),
+        ("registers: a − xy", "unsafe { Self(«$minus(x.0, y.0, self.0)») }", "$plus(x.0, y.0, self.0)"),
+        ("registers: a < b", "«$less(self.0, other.0)»", "$less(other.0, self.0)"),
+        ("registers: a ≤ b", "«$at_most(self.0, other.0)»", "$less(self.0, other.0)"),
+        ("registers: selection", "«$select(mask, no.0, yes.0)»", "$select(mask, yes.0, no.0)"),
+    ],
+    "simd/x86.rs": [
+        ("AVX2: |a|", "«$andnot($set(-0.0), x)»", "$andnot(x, x)"),
+        ("AVX2: selection", "«$blend(no, yes, mask)»", "$blend(yes, no, mask)"),
+        ("AVX2: lanes of a mask, four", "«_mm256_setr_epi64x(1, 2, 4, 8)»", "_mm256_setr_epi64x(8, 4, 2, 1)"),
+        (
+            "AVX2: lanes of a mask, eight",
+            "«_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)»",
+            "_mm256_setr_epi32(2, 1, 4, 8, 16, 32, 64, 128)",
+        ),
+        ("transpose: pairs", "(«_mm256_unpacklo_pd(a, b)»,", "_mm256_unpackhi_pd(a, b)"),
+        (
+            "transpose: halves",
+            "F64x4(«_mm256_permute2f128_pd::<0x31>(ab0, cd0)»)",
+            "_mm256_permute2f128_pd::<0x20>(ab0, cd0)",
+        ),
+        ("AVX2: keys, low", "«_mm256_and_si256(low, bit)»", "low"),
+        ("AVX2: keys, high", "«_mm256_and_si256(high, bit)»", "high"),
+        ("AVX2: low parts of keys", "«_mm256_packus_epi32(keys[0], keys[1])»", "_mm256_packus_epi32(keys[1], keys[0])"),
+        ("AVX-512: halves", "«_mm512_extractf64x4_pd::<1>(eight)»", "_mm512_extractf64x4_pd::<0>(eight)"),
+        (
+            "AVX-512: keys",
+            "«_mm512_mask_or_epi64(keys, lanes, keys, _mm512_set1_epi64(bit as i64))»",
+            "_mm512_mask_or_epi64(keys, !lanes, keys, _mm512_set1_epi64(bit as i64))",
+        ),
+        ("AVX-512: low parts of keys", "_mm_cvtsi128_si64(«words») as u64", "_mm_srli_si128::<8>(words)"),
+    ],
+}
