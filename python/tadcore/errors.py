@@ -1,7 +1,7 @@
 """What can go wrong, and what each error carries.
 
 Every class also derives from the built-in that fits, so that ``except ValueError`` works for bad input and
-``except ArithmeticError`` for a game that has no equilibrium. All of them can be pickled, so they travel whole from a
+``except ArithmeticError`` for a game that has no equilibrium. All of them can be pickled, so they come back whole from a
 worker process.
 """
 
@@ -199,7 +199,7 @@ class WorkerError(TadcoreError, RuntimeError):
         kept = (
             f"they are kept in {self.store}: run the study again with this store and a fresh executor to go on"
             if self.store is not None
-            else "they are lost: with store=… a study keeps them and goes on from there when it is run again"
+            else "they are lost: with store=… a study keeps them and resumes from there when it is run again"
         )
         return f"a worker died ({self.reason}) when {self.done} of {self.chunks} chunks were finished; {kept}"
 
@@ -255,7 +255,7 @@ _LONGEST = 1000  # characters of a path or a rule, in a message
 
 
 def _printable(text: str) -> str:
-    """A text that a stranger may have written: what moves the cursor or turns the writing is escaped."""
+    """A text from an untrusted source: what moves the cursor or turns the writing is escaped."""
     if len(text) > _LONGEST:
         text = f"{text[: _LONGEST // 2]}…{text[-_LONGEST // 2 :]}"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -1,1 +1,1 @@
-"""What every wing uses: arrays from outside, files, limits and text."""
+"""What every other part of the package uses: arrays from outside, files, limits and text."""

@@ -39,7 +39,7 @@ def breakpoints(games: Replays, grid: Floats, played: list[Batch], tolerance: fl
             high[where[~same]] = middle[where[~same]]
             after[where[~same]] = now[~same]
         found.append((trial, high, before, after))
-        on = after != goal  # another outcome lies between: go on from there
+        on = after != goal  # another outcome lies between: continue from there
         trial, low, top, before, goal = trial[on], high[on], top[on], after[on], goal[on]
     trials, radius, first, second = (np.concatenate(part) for part in zip(*found, strict=True)) if found else _NONE
     order = np.lexsort((radius, trials))

@@ -1,4 +1,4 @@
-r"""The value of a radius: outcome probabilities against how far one player sees, or reaches.
+r"""The value of a radius: outcome probabilities against the visibility radius or the capture radius of one player.
 
 A radius is no part of the game's weights, so every radius is played with the same gains and, here, from the same M
 starts: common random numbers. The differences between radii are then differences between pairs of trials, and far
@@ -14,7 +14,7 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 - **Differences** against a reference radius and **slopes** between neighbouring radii, the value of a unit of radius,
   :math:`(P(r_{k+1}) - P(r_k)) / (r_{k+1} - r_k)`, carry paired score intervals.
 - **Breakpoints**, on request: for each trial and each pair of neighbouring radii with different outcomes, bisection
-  finds a radius at which the outcome changes, and goes on until the changes found lead from the one outcome to the
+  finds a radius at which the outcome changes, and continues until the changes found lead from the one outcome to the
   other. A pair of neighbours with the same outcome is taken to hold none; a finer grid sees more.
 """
 

@@ -149,7 +149,7 @@ def sweep(
     progress : bool
         Show a bar for each cell, in a terminal or a notebook.
     store : path, optional
-        A folder with a store for each cell; run again, the sweep goes on, and a larger grid adds to it.
+        A folder with a store for each cell; run again, the sweep resumes, and a larger grid adds to it.
     threads : int, optional
         As in `Study.run`.
     executor : concurrent.futures.Executor, optional

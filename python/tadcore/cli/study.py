@@ -16,7 +16,7 @@ _INTERRUPTED = 130
 
 
 def study(
-    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary, how, and how often.")],
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary and how, and the number of trials.")],
     store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     table: Annotated[
@@ -33,7 +33,7 @@ def study(
       tadcore study my-study.toml --store out --threads 4 --no-progress
       tadcore study my-study.toml --store out --table paper-i1.table
 
-    Run again, it goes on from what DIR holds. A study file looks like this:
+    Run again, it resumes from what DIR holds. A study file looks like this:
 
     \b
       scenario = "paper-i1"
@@ -55,7 +55,7 @@ def study(
     try:
         result = wanted.run(progress=progress, store=store, threads=threads, table=table)
     except KeyboardInterrupt:
-        complain(f"interrupted; what was finished is in {store}, and the same command goes on from there")
+        complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None
     say(f"{result.trials:,} trials")
     for name, count in result.counts().items():

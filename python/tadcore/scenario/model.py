@@ -91,7 +91,7 @@ class Target(CheckedModel):
     control_weight: Weight = Field(description="r_τ, the cost of effort")
     running_weight: Weight = Field(default=1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
     terminal_weight: Weight = Field(default=1.0, description="f_τa, the same at T (I1 only)")
-    visibility_radius: Radius = Field(default=math.inf, description="ζ_τ, how far it sees; inf for unlimited (I2 only)")
+    visibility_radius: Radius = Field(default=math.inf, description="ζ_τ, its visibility radius; inf for unlimited (I2 only)")
 
 
 class Defender(CheckedModel):
@@ -103,7 +103,7 @@ class Defender(CheckedModel):
     position: Position = Field(description="X_d(0), the initial position, 2 or 3 finite numbers")
     control_weight: Weight = Field(description="r_d, the cost of effort")
     capture_radius: Positive = Field(description="σ_d, within which it intercepts the attacker")
-    visibility_radius: Radius = Field(default=math.inf, description="ζ_d, how far it sees; inf for unlimited")
+    visibility_radius: Radius = Field(default=math.inf, description="ζ_d, its visibility radius; inf for unlimited")
     running_weight: Weight = Field(default=1.0, description="q_da, weight on the distance to the attacker (I1 only)")
     terminal_weight: Weight = Field(default=1.0, description="f_da, the same at T (I1 only)")
     evasion_running_weight: Weight = Field(default=1.0, description="q_ad, the attacker's weight on evading it")
@@ -245,7 +245,7 @@ class Scenario(CheckedModel):
         return cls.model_validate(parse_toml(text, name))
 
     def to_toml(self, path: str | os.PathLike[str] | None = None) -> str:
-        """The scenario as TOML, every number to the bit, and written to ``path`` if given."""
+        """The scenario as TOML, every number exactly, and written to ``path`` if given."""
         # Arrays here hold a few numbers: they read better on one line.
         text = _ARRAY.sub(lambda lines: f"[{' '.join(lines[1].split())[:-1]}]", tomli_w.dumps(self.model_dump()))
         if path is not None:
@@ -253,7 +253,7 @@ class Scenario(CheckedModel):
         return text
 
     def describe(self) -> str:
-        """A few lines for a reader: who plays, for how long, who sees how far."""
+        """A few lines for a reader: the players, the horizon, the radii."""
         names = {
             "I1": "I1, defenders against attacker and target",
             "I2": "I2, defenders and target against attacker",
@@ -268,7 +268,7 @@ class Scenario(CheckedModel):
         capture = dict(zip([*self.players[: self.n], "attacker"], self.capture_radii, strict=True))
         for label, position in zip(self.players, self.positions, strict=True):
             place = ", ".join(f"{x:g}" for x in position)
-            line = f"{label:<8} at ({place}), sees {_reach(sight.get(label, math.inf))}"
+            line = f"{label:<8} at ({place}), {_reach(sight.get(label, math.inf))}"
             lines.append(line + (f", captures within {capture[label]:g}" if label in capture else ""))
         return "\n".join(lines)
 
@@ -318,4 +318,4 @@ def _prune(data: dict[str, Any], interaction: object) -> None:
 
 
 def _reach(radius: float) -> str:
-    return "everything" if math.isinf(radius) else f"{radius:g} far"
+    return "unlimited sight" if math.isinf(radius) else f"visibility radius {radius:g}"

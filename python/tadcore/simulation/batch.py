@@ -74,7 +74,7 @@ def simulate_batch(
 ) -> Batch:
     """Play M games that share the scenario's weights, horizon and step.
 
-    Every row is checked before anything runs, and the outcomes are the same, to the bit, for any number of threads.
+    Every row is checked before anything runs, and the outcomes are bitwise reproducible for any number of threads.
 
     Parameters
     ----------

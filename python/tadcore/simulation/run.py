@@ -1,7 +1,7 @@
 """One game, everything recorded.
 
 At every instant t_k of the grid: termination, the network from the distances (eq:limob of Singh and Reddy), the gains
-for that network (eq:optproblem, eq:optproblem2), then one step of the closed loop with its matrix frozen,
+for that network (eq:optproblem, eq:optproblem2), then one sampled-data step of the closed loop (zero-order hold),
 z(t_{k+1}) = exp(C_k δ) z(t_k). Everything is dimensionless, as in the paper.
 """
 
@@ -109,7 +109,7 @@ class Run:
     def network_changes(self) -> tuple[NetworkChange, ...]:
         """(time, edges added, edges removed) wherever the network changes, the initial network first.
 
-        Empty for a game that is over at t = 0: termination is tested before visibility.
+        Empty for a game that is over at t = 0: termination is tested before the network is formed.
         """
         in_force = len(self.times) - 1
         return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
@@ -142,7 +142,7 @@ class Run:
         Parameters
         ----------
         seconds : float
-            How long the game takes on the screen; pauses at network changes and at the end come on top.
+            How long the game takes on the screen; pauses at network changes and at the end are added.
         fps : float
             Pictures in a second.
         width : float
@@ -173,9 +173,9 @@ class Run:
         network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
         warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
         edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
-        loud = f", chattering: {', '.join(edges)}" if edges else ""
+        chattering = f", chattering: {', '.join(edges)}" if edges else ""
         other = f"; a variant, edges with {self.variant}" if self.variant else ""
-        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{loud}{warning}{other})"
+        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{chattering}{warning}{other})"
 
 
 def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Run:

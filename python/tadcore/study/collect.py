@@ -1,4 +1,4 @@
-"""Every chunk of a study from its store or computed, looked at in order, up to where a rule stops it."""
+"""Every chunk of a study from its store or computed, examined in order, up to where a rule stops it."""
 
 from __future__ import annotations
 

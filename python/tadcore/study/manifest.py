@@ -143,7 +143,7 @@ class Manifest:
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             lacks = f"it has no entry {error}" if isinstance(error, KeyError) else error
             raise StoreError(path, f"it is no manifest of a study ({lacks})", "name another folder") from None
-        if manifest.chunk != CHUNK:  # what a part may hold at most: a stranger does not decide how much is read
+        if manifest.chunk != CHUNK:  # what a part may hold at most: an untrusted file does not decide how much is read
             found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
             raise StoreError(path, found, "read it with the version that wrote it")
         return manifest

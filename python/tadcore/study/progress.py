@@ -1,4 +1,4 @@
-"""A progress bar with the rate and running estimates of how the games end; silent where nobody looks."""
+"""A progress bar with the rate and running estimates of how the games end; silent where nothing shows it."""
 
 from __future__ import annotations
 

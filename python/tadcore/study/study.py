@@ -1,7 +1,7 @@
 """A study: many games around one scenario, drawn, played in chunks, kept and counted.
 
 The trials of a study are numbered. What trial i plays and how it ends depend on the scenario, on what varies, on the
-seed and on i alone: not on the number of threads, the executor, the length of the study, or how often it was cut off.
+seed and on i alone: not on the number of threads, the executor, the length of the study, or the number of interruptions.
 
 Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
 
@@ -202,7 +202,7 @@ class Study:
         progress : bool or str
             Show a bar with the rate and running estimates, in a terminal or a notebook; a string stands before it.
         store : path, optional
-            A folder that keeps every finished chunk. If it holds this study already, the run goes on from there; a
+            A folder that keeps every finished chunk. If it holds this study already, the run resumes from there; a
             larger ``trials`` extends it.
         threads : int, optional
             Threads for each chunk; all cores by default, or 1 in the workers of an executor.
@@ -213,12 +213,12 @@ class Study:
             Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
         table : path, optional
             A file that keeps the game's table of transitions from study to study: read before, written after. With it
-            a study of the same game starts warm; the outcomes are the same. Not used by an executor's workers.
+            a study of the same game reuses the saved gain table; the outcomes are the same. Not used by an executor's workers.
 
         Returns
         -------
         StudyResult
-            The same to the bit for any number of threads, any executor and any interruptions.
+            Bitwise reproducible for any number of threads, any executor and any interruptions.
 
         Raises
         ------
@@ -319,7 +319,7 @@ class StudyResult(Trials):
         return self.scenario.replace(changes)
 
     def replay(self, trial: int) -> Run:
-        """One trial again, everything recorded; its outcome is the one in the table, to the bit.
+        """One trial again, everything recorded; its outcome is bitwise the one in the table.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A game's table of transitions on disk, so that the next study of the game starts warm."""
+"""A game's table of transitions on disk, so that the next study of the game reuses it."""
 
 from __future__ import annotations
 

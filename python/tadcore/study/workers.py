@@ -67,7 +67,7 @@ def _submitted(plan: Plan, jobs: Sequence[Job], executor: Executor, threads: int
 
 @contextlib.contextmanager
 def _told(plan: Plan, chunk: int | None = None) -> Iterator[None]:
-    """Tell a dead worker and a sampler that cannot travel from an error of the user's own code."""
+    """Tell a dead worker and a sampler that cannot be pickled from an error of the user's own code."""
     try:
         yield
     except TadcoreError:

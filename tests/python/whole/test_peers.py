@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-PEERS = Path(__file__).parents[2] / "benches" / "peers"
+PEERS = Path(__file__).parents[3] / "benches" / "peers"
 SCRIPTS = {
     "riccati": ["P at every node"],
     "synthesis": ["Θ on certified networks", "how far a peer's Θ is below tadcore's", "gains where Θ is equal"],

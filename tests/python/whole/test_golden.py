@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("tadcore._core")
 
-SCRIPT = Path(__file__).parents[1] / "reference" / "golden.py"
+SCRIPT = Path(__file__).parents[2] / "reference" / "golden.py"
 
 
 def test_everything_is_as_recorded(reference):

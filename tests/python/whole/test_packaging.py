@@ -10,7 +10,7 @@ import pytest
 
 import tadcore
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def modules_of(code):

@@ -24,7 +24,7 @@ from tadcore import StoreError
 from tadcore.sampling.shapes import Box, Choice
 from tadcore.study.manifest import Manifest
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")

@@ -224,7 +224,7 @@ def test_repr_and_description_are_short():
 
 
 def test_the_bundled_scenarios_are_the_eight_runs():
-    cases = json.loads((Path(__file__).parents[1] / "reference" / "paper_scenarios.json").read_text("utf-8"))
+    cases = json.loads((Path(__file__).parents[2] / "reference" / "paper_scenarios.json").read_text("utf-8"))
     assert scenarios.names() == tuple(cases["runs"])
     for name, run in cases["runs"].items():
         sc, common = scenarios.load(name), cases[run["interaction"]]

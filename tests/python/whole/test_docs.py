@@ -13,7 +13,7 @@ import pytest
 import tadcore
 from tadcore import analysis, plotting, sampling, statistics, verification
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 PAGES = sorted(
     page for page in DOCS.rglob("*.md") if "_build" not in page.parts and "jupyter_execute" not in page.parts
 )

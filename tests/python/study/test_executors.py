@@ -14,7 +14,7 @@ import tadcore
 from study_cases import CHUNK, FLAG, lethal, parts, study
 from tadcore import ScenarioError, WorkerError
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")

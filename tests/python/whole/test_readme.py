@@ -8,7 +8,7 @@ import pytest
 
 from tadcore.cli.app import app
 
-README = Path(__file__).parents[2] / "README.md"
+README = Path(__file__).parents[3] / "README.md"
 
 
 def test_python_blocks_run_in_order(
