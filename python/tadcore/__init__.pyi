@@ -1,86 +1,41 @@
 from . import (
-    analysis,
-    cli,
-    errors,
-    explorer,
-    game,
-    plotting,
-    report,
-    reproduce,
-    sampling,
-    scenario,
-    scenarios,
-    simulation,
-    statistics,
-    study,
-    verification,
+    analysis as analysis,
+    cli as cli,
+    errors as errors,
+    explorer as explorer,
+    game as game,
+    plotting as plotting,
+    report as report,
+    reproduce as reproduce,
+    sampling as sampling,
+    scenario as scenario,
+    scenarios as scenarios,
+    simulation as simulation,
+    statistics as statistics,
+    study as study,
+    verification as verification,
 )
-from ._core import __version__
-from .analysis.maps import OutcomeMap, outcome_map
-from .analysis.radius import RadiusCurve, radius_curve
-from .analysis.sweeps import SweepResult, sweep
-from .errors import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, VerificationError, WorkerError
-from .game.changes import NetworkChange
-from .game.equilibrium import Equilibrium, solve_equilibrium
-from .game.network import VisibilityNetwork
-from .game.outcome import Outcome, OutcomeKind
-from .game.synthesis import Gains, synthesize
-from .scenario.model import Attacker, Defender, Scenario, Target
-from .simulation.batch import Batch, simulate_batch
-from .simulation.run import Run, simulate
-from .statistics import HalfWidth
-from .study.study import Study, StudyResult, load_study
-from .verification import VerificationReport, verify
-
-__all__ = [
-    "Attacker",
-    "Batch",
-    "Defender",
-    "Equilibrium",
-    "Gains",
-    "HalfWidth",
-    "NetworkChange",
-    "NoEquilibriumError",
-    "Outcome",
-    "OutcomeKind",
-    "OutcomeMap",
-    "RadiusCurve",
-    "Run",
-    "Scenario",
-    "ScenarioError",
-    "StoreError",
-    "Study",
-    "StudyResult",
-    "SweepResult",
-    "TadcoreError",
-    "Target",
-    "VerificationError",
-    "VerificationReport",
-    "VisibilityNetwork",
-    "WorkerError",
-    "__version__",
-    "analysis",
-    "cli",
-    "errors",
-    "explorer",
-    "game",
-    "load_study",
-    "outcome_map",
-    "plotting",
-    "radius_curve",
-    "report",
-    "reproduce",
-    "sampling",
-    "scenario",
-    "scenarios",
-    "simulate",
-    "simulate_batch",
-    "simulation",
-    "solve_equilibrium",
-    "statistics",
-    "study",
-    "sweep",
-    "synthesize",
-    "verification",
-    "verify",
-]
+from ._core import __version__ as __version__
+from .analysis.maps import OutcomeMap as OutcomeMap, outcome_map as outcome_map
+from .analysis.radius import radius_curve as radius_curve
+from .analysis.sweeps import SweepResult as SweepResult, sweep as sweep
+from .errors import (
+    NoEquilibriumError as NoEquilibriumError,
+    ScenarioError as ScenarioError,
+    StoreError as StoreError,
+    TadcoreError as TadcoreError,
+    VerificationError as VerificationError,
+    WorkerError as WorkerError,
+)
+from .game.changes import NetworkChange as NetworkChange
+from .game.equilibrium import Equilibrium as Equilibrium, solve_equilibrium as solve_equilibrium
+from .game.network import VisibilityNetwork as VisibilityNetwork
+from .game.outcome import Outcome as Outcome, OutcomeKind as OutcomeKind
+from .game.synthesis import Gains as Gains, synthesize as synthesize
+from .scenario.model import Attacker as Attacker, Defender as Defender, Scenario as Scenario, Target as Target
+from .simulation.batch import Batch as Batch, simulate_batch as simulate_batch
+from .simulation.run import Run as Run, simulate as simulate
+from .statistics import HalfWidth as HalfWidth
+from .statistics.radius import RadiusCurve as RadiusCurve
+from .study.study import Study as Study, StudyResult as StudyResult, load_study as load_study
+from .verification import VerificationReport as VerificationReport, verify as verify

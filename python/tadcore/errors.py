@@ -1,8 +1,8 @@
 """What can go wrong, and what each error carries.
 
 Every class also derives from the built-in that fits, so that ``except ValueError`` works for bad input and
-``except ArithmeticError`` for a game that has no equilibrium. All of them can be pickled, so they come back whole from a
-worker process.
+``except ArithmeticError`` for a game that has no equilibrium. All of them can be pickled, so they come back whole
+from a worker process.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tadcore
-from tadcore.sampling.shapes import Box, Disk
+from tadcore.sampling import Box, Disk
 
 CHUNK = 8192
 FLAG = "TADCORE_TEST_LETHAL"

@@ -7,22 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = [
-    "COORDINATE",
-    "FARTHEST",
-    "FINITE",
-    "FRACTION",
-    "HEAVIEST",
-    "LIGHTEST",
-    "MOST_DEFENDERS",
-    "OF_FIELD",
-    "POSITIVE",
-    "RADIUS",
-    "WEIGHT",
-    "Rule",
-    "sees_whom_it_intercepts",
-]
-
 LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
 """Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
 

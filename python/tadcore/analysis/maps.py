@@ -20,6 +20,7 @@ from tadcore._shared.arrays import as_index
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
+from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
 from tadcore.simulation.batch import simulate_batch
 
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["OutcomeMap", "outcome_map"]
 
 _BLOCK = 1 << 16
 """Starts played at once: some megabytes of positions, and enough work for any number of threads."""

@@ -20,26 +20,19 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
-from tadcore.statistics import outcome_names, proportion_interval
+from tadcore.scenario.model import Scenario
+from tadcore.statistics import TrialOutcomes, outcome_names, proportion_interval
 from tadcore.statistics.comparison import discordant
 from tadcore.statistics.outcomes import as_level, indicators
-from tadcore.statistics.radius import Breakpoints, RadiusCurve, RadiusKind, paired_differences
+from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
 
 from .breakpoints import breakpoints
 from .replays import Replays, starts_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-    from tadcore.statistics import TrialOutcomes
-
-__all__ = ["Breakpoints", "RadiusCurve", "radius_curve"]
 
 
 def radius_curve(

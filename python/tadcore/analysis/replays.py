@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,10 +13,8 @@ from tadcore.scenario.paths import label
 from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.starts import Rows, rows_of
-
-if TYPE_CHECKING:
-    from tadcore.statistics import TrialOutcomes
-    from tadcore.statistics.radius import RadiusKind
+from tadcore.statistics import TrialOutcomes
+from tadcore.statistics.radius import RadiusKind
 
 
 def starts_of(source: Scenario | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import simulate_batch
 from tadcore.simulation.starts import rows_of
 from tadcore.statistics.outcomes import indicators, outcome_names
 from tadcore.statistics.sobol import Distribution, Sensitivity, sobol
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Sensitivity", "sensitivity", "sobol"]
 
 
 def sensitivity(

@@ -21,13 +21,11 @@ import numpy as np
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.paths import expand, normal
+from tadcore.study.collect import StoppingRule
+from tadcore.study.study import Study, StudyResult
 
 if TYPE_CHECKING:
     import xarray
-
-    from tadcore.study.study import StoppingRule, Study, StudyResult
-
-__all__ = ["Cell", "SweepResult", "sweep"]
 
 
 @dataclass(frozen=True, eq=False)

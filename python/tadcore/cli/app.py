@@ -24,8 +24,6 @@ from .study import study
 from .terminal import complain, say
 from .verify import verify
 
-__all__ = ["app", "main"]
-
 _BAD_INPUT = 2
 
 app = typer.Typer(

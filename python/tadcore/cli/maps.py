@@ -13,8 +13,6 @@ from tadcore.errors import ScenarioError
 from .options import Changes, Source, read
 from .terminal import say
 
-__all__ = ["draw_map", "write_report"]
-
 
 def draw_map(
     scenario: Source,

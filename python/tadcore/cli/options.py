@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tadcore import scenarios as bundled
 from tadcore._shared.files import parse_toml
 from tadcore.errors import ScenarioError
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["FAILED", "Changes", "Source", "read", "usable"]
+from tadcore.scenario.model import Scenario
 
 FAILED = 1
 """The exit code of a game without an equilibrium, and of a check that failed."""

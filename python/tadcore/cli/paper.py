@@ -10,8 +10,6 @@ import typer
 from .options import FAILED, usable
 from .terminal import complain
 
-__all__ = ["reproduce"]
-
 
 def reproduce(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where tables and figures go.")] = Path("out/paper"),

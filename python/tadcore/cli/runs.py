@@ -14,8 +14,6 @@ from tadcore.errors import ScenarioError
 from .options import FAILED, Changes, Source, read, usable
 from .terminal import complain, say
 
-__all__ = ["scenarios", "simulate", "validate"]
-
 
 def simulate(
     scenario: Source,

@@ -10,8 +10,6 @@ import typer
 
 from .terminal import complain, say
 
-__all__ = ["study"]
-
 _INTERRUPTED = 130
 
 

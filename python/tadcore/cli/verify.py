@@ -14,8 +14,6 @@ from tadcore._shared.files import write_whole
 from .options import FAILED, Changes, Source, read
 from .terminal import complain, say
 
-__all__ = ["verify"]
-
 
 def verify(
     scenario: Source,

@@ -1,5 +1,3 @@
-from .model import Explorer
-from .page import Page
-from .server import serve
-
-__all__ = ["Explorer", "Page", "serve"]
+from .model import Explorer as Explorer
+from .page import Page as Page
+from .server import serve as serve

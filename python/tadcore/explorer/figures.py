@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from bokeh.models import ColumnDataSource, PointDrawTool, Range1d, Span
@@ -10,9 +10,7 @@ from bokeh.plotting import figure
 from bokeh.transform import factor_cmap, factor_mark
 
 from tadcore.plotting.tools.style import look, symbol
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
+from tadcore.scenario.model import Scenario
 
 Sources = dict[str, ColumnDataSource]
 

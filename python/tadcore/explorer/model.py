@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import io
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
-from tadcore.game.network import edges_of
+from tadcore.game.network import Edge, edges_of
+from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run, simulate
-
-if TYPE_CHECKING:
-    from tadcore.game.network import Edge
-    from tadcore.scenario.model import Scenario
-
 
 MOST_POINTS = 400
 """No curve goes to the browser with more points than about this."""

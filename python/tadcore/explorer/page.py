@@ -17,13 +17,13 @@ from tadcore.errors import TadcoreError
 from tadcore.plotting.run.raster import bars_of
 
 from .figures import arena, controls, edge_name, frame, instant, plain, theta, timeline
+from .model import Explorer
 from .pointer import Pointer
 
 if TYPE_CHECKING:
     from bokeh.document import Document
     from bokeh.models import LayoutDOM
 
-    from .model import Explorer
 
 _UNLIMITED = 10.0  # the right end of a visibility slider
 _GRAB = 0.05  # of the picture: how near the pointer must be to what it grabs

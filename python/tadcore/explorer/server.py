@@ -9,13 +9,14 @@ from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.server.server import Server
 
+from tadcore.scenario.model import Scenario
+
 from .model import Explorer
 from .page import Page
 
 if TYPE_CHECKING:
     from bokeh.document import Document
 
-    from tadcore.scenario.model import Scenario
 
 _ADDRESS = "127.0.0.1"
 

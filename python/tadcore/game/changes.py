@@ -12,8 +12,6 @@ from tadcore._shared.arrays import Floats
 
 from .network import Edge, edges_of
 
-__all__ = ["Interval", "NetworkChange", "changes_of", "intervals_of"]
-
 
 class NetworkChange(NamedTuple):
     """An instant at which the network is another than one step before."""

@@ -8,16 +8,11 @@ not. `tadcore.verification.sliding_study` compares a run with its continuous lim
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .network import Edge, edges_of
-
-if TYPE_CHECKING:
-    from .recorded import Recorded
-
-__all__ = ["Chatter", "chatter"]
+from .recorded import Recorded
 
 _FEWEST_FLIPS = 6
 _LONGEST_PAUSE = 5

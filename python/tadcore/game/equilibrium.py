@@ -17,20 +17,15 @@ in the order d1 … dn, target; the paper's matrix is p ⊗ I. Everything is dim
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore import _core
 from tadcore._shared.arrays import Floats, as_index
 from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
 
 from .compiled import game_of
-
-if TYPE_CHECKING:
-    from tadcore import _core
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Equilibrium", "solve_equilibrium"]
 
 
 class Equilibrium:

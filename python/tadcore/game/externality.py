@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .recorded import Recorded
 from .synthesis import synthesize
 
 if TYPE_CHECKING:
     import xarray
-
-    from .recorded import Recorded
-
-__all__ = ["control_jumps"]
 
 
 def control_jumps(run: Recorded) -> xarray.Dataset:

@@ -21,18 +21,14 @@ This is for looking at one instant; runs use the compiled core.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import as_adjacency, as_positions, shape_of
 from tadcore.errors import ScenarioError
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Edge", "VisibilityNetwork", "edges_of"]
+from tadcore.scenario.model import Scenario
 
 Edge: TypeAlias = tuple[str, str]
 """Who sees whom, such as ``("d1", "attacker")``."""

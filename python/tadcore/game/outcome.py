@@ -6,8 +6,6 @@ import enum
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Outcome", "OutcomeKind"]
-
 
 class OutcomeKind(enum.IntEnum):
     """The codes of `tadcore.Batch.kind`."""

@@ -6,20 +6,16 @@ of how a game is played, and a run can offer its figures as methods.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.model import Scenario
 
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-    from .changes import Interval, NetworkChange
-    from .outcome import Outcome
-
-__all__ = ["Recorded"]
+from .changes import Interval, NetworkChange
+from .outcome import Outcome
 
 
 class Recorded(Protocol):

@@ -13,22 +13,17 @@ reported here; the minimiser is the same.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
 
 from .compiled import game_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-    from .network import VisibilityNetwork
-
-__all__ = ["Gains", "synthesize", "theta_terms"]
+from .network import VisibilityNetwork
 
 _TERMS = {"I1": ("dQ_d", "dQ_tau", "dQ_a", "S1"), "I2": ("dQ", "S2", "S3")}
 

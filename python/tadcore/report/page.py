@@ -12,8 +12,6 @@ from tadcore.scenario.provenance import provenance
 from .parts import Reported
 from .sections import examples, inputs, notes, origin, outcomes, times
 
-__all__ = ["report"]
-
 
 def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float = 0.95) -> Path:
     """Write a study as an HTML page.

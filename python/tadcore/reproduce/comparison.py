@@ -13,7 +13,6 @@ from .published import I2_NOTE
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["Report", "Row"]
 
 _WIDE = 96  # columns of a terminal from which on the case stands in a column of its own
 

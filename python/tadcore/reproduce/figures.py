@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
@@ -11,13 +10,9 @@ from tadcore.plotting.run.network import network
 from tadcore.plotting.run.series import controls
 from tadcore.plotting.run.trajectories import trajectories
 from tadcore.plotting.tools.style import COLUMN, PAGE, edge_text
-
-if TYPE_CHECKING:
-    from tadcore.simulation.run import Run
+from tadcore.simulation.run import Run
 
 Runs = Mapping[str, "Run"]
-
-__all__ = ["FIGURES", "first_edge"]
 
 
 def first_edge(run: Run, observer: str, seen: str | None = None) -> float | None:

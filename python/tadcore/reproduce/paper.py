@@ -20,7 +20,7 @@ import numpy as np
 
 from tadcore import _core, scenarios
 from tadcore._shared.progress import bar
-from tadcore.simulation.run import simulate
+from tadcore.simulation.run import Run, simulate
 
 from .comparison import Report, Row
 from .published import PUBLISHED, Published
@@ -28,9 +28,6 @@ from .published import PUBLISHED, Published
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from tadcore.simulation.run import Run
-
-__all__ = ["Report", "Row", "compare", "reproduce"]
 
 _SAME_INSTANT = 1e-9
 _ROUNDING = 1e-9

@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["I2_NOTE", "PUBLISHED", "Published"]
-
 I2_NOTE = (
     "Interaction I2: the computed winners are the paper's, the times are not. The run with full observation has no "
     "free choice in it, neither a gain to synthesise nor a network, and integrating its differential equations in "

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from tadcore.errors import MISSING, ScenarioError
 
+from .base import Block, Sampler
 from .design import generator
-from .shapes import Annulus, Block, Box, Choice, Cycle, Disk, Gaussian, Sampler
-
-__all__ = ["as_sampler", "from_table"]
+from .shapes import Annulus, Box, Choice, Cycle, Disk, Gaussian
 
 _BUILT_IN: dict[str, type[Sampler]] = {
     kind.__name__.lower(): kind for kind in (Annulus, Box, Choice, Cycle, Disk, Gaussian)

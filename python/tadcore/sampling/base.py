@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore.errors import ScenarioError
 
-__all__ = ["Block", "Parameters", "Sampler", "covariance", "listed", "numbers", "positive"]
-
 
 class Block(NamedTuple):
     """What a sampler draws from: one chunk of trials."""

@@ -20,8 +20,6 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CHUNK", "DESIGNS", "STREAM", "Design", "generator", "unit_points"]
-
 CHUNK = 8192
 """Trials in a chunk; a constant, since the draws depend on it."""
 

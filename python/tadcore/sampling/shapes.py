@@ -31,9 +31,7 @@ from numpy.typing import NDArray
 
 from tadcore.errors import ScenarioError
 
-from .base import Block, Parameters, Sampler, covariance, listed, numbers, positive
-
-__all__ = ["Annulus", "Block", "Box", "Choice", "Cycle", "Disk", "Gaussian", "Sampler"]
+from .base import Block, Parameters, covariance, listed, numbers, positive
 
 
 @dataclass(frozen=True)

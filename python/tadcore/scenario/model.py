@@ -50,8 +50,6 @@ from .fields import (
 )
 from .paths import beyond, expand
 
-__all__ = ["Attacker", "Defender", "Scenario", "Target"]
-
 _MOST_STEPS = 10_000_000
 _DIVISION_TOLERANCE = 1e-9
 _TERMS = {"I1": 4, "I2": 3}
@@ -91,7 +89,9 @@ class Target(CheckedModel):
     control_weight: Weight = Field(description="r_τ, the cost of effort")
     running_weight: Weight = Field(default=1.0, description="q_τa, weight on the distance to the attacker (I1 only)")
     terminal_weight: Weight = Field(default=1.0, description="f_τa, the same at T (I1 only)")
-    visibility_radius: Radius = Field(default=math.inf, description="ζ_τ, its visibility radius; inf for unlimited (I2 only)")
+    visibility_radius: Radius = Field(
+        default=math.inf, description="ζ_τ, visibility radius; inf for unlimited (I2 only)"
+    )
 
 
 class Defender(CheckedModel):
@@ -103,7 +103,7 @@ class Defender(CheckedModel):
     position: Position = Field(description="X_d(0), the initial position, 2 or 3 finite numbers")
     control_weight: Weight = Field(description="r_d, the cost of effort")
     capture_radius: Positive = Field(description="σ_d, within which it intercepts the attacker")
-    visibility_radius: Radius = Field(default=math.inf, description="ζ_d, its visibility radius; inf for unlimited")
+    visibility_radius: Radius = Field(default=math.inf, description="ζ_d, visibility radius; inf for unlimited")
     running_weight: Weight = Field(default=1.0, description="q_da, weight on the distance to the attacker (I1 only)")
     terminal_weight: Weight = Field(default=1.0, description="f_da, the same at T (I1 only)")
     evasion_running_weight: Weight = Field(default=1.0, description="q_ad, the attacker's weight on evading it")

@@ -24,8 +24,6 @@ from typing import Any
 
 from tadcore.errors import ScenarioError
 
-__all__ = ["AXES", "beyond", "expand", "is_owner", "label", "normal", "short"]
-
 AXES = "xyz"
 _EXAMPLES = "a path such as attacker.position or d1.visibility_radius"
 _INDEX = re.compile(r"\[(\d+|\*)\]")

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING
 
 from tadcore import _core
 
-if TYPE_CHECKING:
-    from .model import Scenario
-
-__all__ = ["provenance"]
+from .model import Scenario
 
 
 def provenance(sc: Scenario) -> dict[str, str]:

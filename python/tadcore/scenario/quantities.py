@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore.errors import ScenarioError
 
+from .model import Scenario
 from .paths import AXES, beyond, normal
-
-if TYPE_CHECKING:
-    from .model import Scenario
-
-__all__ = ["STATES", "Quantity", "component", "quantities_of", "setups"]
 
 STATES = ("position", "visibility_radius", "capture_radius")
 """The fields that are no part of the game: a run has them, and the game does not."""

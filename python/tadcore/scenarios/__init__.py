@@ -11,13 +11,10 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tadcore._shared.text import similar
 from tadcore.errors import MISSING, ScenarioError
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
+from tadcore.scenario.model import Scenario
 
 __all__ = ["find", "load", "names", "summary", "text"]
 

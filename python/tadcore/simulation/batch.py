@@ -11,15 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import as_index, as_positions
 from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, OutcomeKind
+from tadcore.scenario.model import Scenario
 
 from .rules import capture_rows, compare, visibility_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Batch", "simulate_batch"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,24 +5,61 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
 
 from tadcore._shared.files import write_whole
+from tadcore.game.network import Edge
+from tadcore.game.recorded import Recorded
 from tadcore.game.synthesis import theta_terms
 from tadcore.scenario.provenance import provenance
-
-if TYPE_CHECKING:
-    from tadcore.game.network import Edge
-
-    from .run import Run
 
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
 
 
-def dataset_of(run: Run) -> xr.Dataset:
+class Written(Recorded, Protocol):
+    """What a file tells of a run beyond its arrays; `tadcore.Run` has it."""
+
+    @property
+    def variant(self) -> str:
+        """What sets it apart from the paper's game; empty where nothing does."""
+
+    @property
+    def hysteresis(self) -> float:
+        """See `tadcore.simulate`."""
+
+    @property
+    def dwell(self) -> float:
+        """See `tadcore.simulate`."""
+
+    @property
+    def costs(self) -> dict[str, float]:
+        """J of every player."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether all gains reached the tolerance."""
+
+    @property
+    def unconverged(self) -> int:
+        """Instants at which they did not."""
+
+    @property
+    def certified(self) -> int:
+        """Rows whose gains are proved to be globally optimal."""
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the synthesis solver."""
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The record with labels."""
+
+
+def dataset_of(run: Written) -> xr.Dataset:
     """Every recorded array under its label, symbol and source."""
     sc = run.scenario
     attacker = run.position[:, -1:, :]
@@ -70,7 +107,7 @@ def dataset_of(run: Run) -> xr.Dataset:
     )
 
 
-def variant_of(run: Run) -> dict[str, Any]:
+def variant_of(run: Written) -> dict[str, Any]:
     """What a reader of a file must know of a run that is not the paper's game; empty for one that is."""
     if not run.variant:
         return {}
@@ -86,7 +123,7 @@ def _about(name: str, symbol: str, source: str) -> dict[str, str]:
     return {key: value for key, value in attributes.items() if value}
 
 
-def summary_of(run: Run) -> dict[str, Any]:
+def summary_of(run: Written) -> dict[str, Any]:
     """The run in a few numbers, ready for JSON."""
     return {
         "outcome": {
@@ -112,7 +149,7 @@ def _arrows(edges: tuple[Edge, ...]) -> list[str]:
     return [f"{observer}->{seen}" for observer, seen in edges]
 
 
-def save(run: Run, folder: str | os.PathLike[str]) -> None:
+def save(run: Written, folder: str | os.PathLike[str]) -> None:
     """Write the dataset, the scenario and the summary into a folder, made where it is not there."""
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)

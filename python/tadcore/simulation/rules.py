@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import as_real, refuse_where
 from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["capture_rows", "compare", "visibility_rows"]
+from tadcore.scenario.model import Scenario
 
 
 def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:

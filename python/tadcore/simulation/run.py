@@ -16,20 +16,17 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import as_amount
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
+from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
 from tadcore.game.outcome import Outcome
+from tadcore.plotting import Animation
+from tadcore.plotting.run.accessor import Plots
+from tadcore.scenario.model import Scenario
 
 if TYPE_CHECKING:
     import os
 
     import xarray
-
-    from tadcore.game.chattering import Chatter
-    from tadcore.plotting import Animation
-    from tadcore.plotting.run.accessor import Plots
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Run", "simulate"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

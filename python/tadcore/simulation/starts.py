@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component, setups
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
+from tadcore.scenario.model import Scenario
 
 KINDS = tuple(kind.name.lower() for kind in OutcomeKind)
 """Names of the three kinds, at the place of their codes."""

@@ -21,8 +21,6 @@ from .store import Store
 from .table import table_of
 from .workers import LostWorkerError, computed
 
-__all__ = ["Collection", "StoppingRule", "jobs_of"]
-
 
 @runtime_checkable
 class StoppingRule(Protocol):

@@ -21,8 +21,6 @@ from tadcore.errors import StoreError, shorten
 from tadcore.sampling.adapters import as_plain, from_plain
 from tadcore.sampling.design import CHUNK, STREAM
 
-__all__ = ["FORMAT", "SEAL", "Manifest", "environment", "reason", "seal"]
-
 Kind = TypeVar("Kind")
 
 FORMAT = 2

@@ -5,24 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
+from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
-from tadcore.sampling.shapes import Block, Sampler
+from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
 
 from .vary import quantities
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["Outcomes", "Plan", "run_chunk"]
 
 _CHECKED_AHEAD = 128  # chunks, about a million trials: their draws cost little beside their games
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from tadcore.game.outcome import OutcomeKind
 
-__all__ = ["Progress"]
-
 _FORMAT = "{desc}|{bar}| {n_fmt}/{total_fmt} [{remaining}, {rate_fmt}{postfix}]"
 
 

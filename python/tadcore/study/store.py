@@ -28,8 +28,6 @@ from tadcore.errors import StoreError
 from .manifest import Manifest, environment, reason
 from .table import digest, encoded
 
-__all__ = ["Store"]
-
 _PART = re.compile(r"part-(\d{6,})\.parquet")
 _AGAIN = "delete this file and run the study again: only its chunk is computed anew"
 

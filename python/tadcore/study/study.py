@@ -1,7 +1,7 @@
 """A study: many games around one scenario, drawn, played in chunks, kept and counted.
 
 The trials of a study are numbered. What trial i plays and how it ends depend on the scenario, on what varies, on the
-seed and on i alone: not on the number of threads, the executor, the length of the study, or the number of interruptions.
+seed and on i alone: not on the number of threads, the executor, the length of the study, or its interruptions.
 
 Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
 
@@ -37,8 +37,8 @@ from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
 from tadcore.sampling.adapters import as_sampler, from_table
+from tadcore.sampling.base import Sampler
 from tadcore.sampling.design import DESIGNS, Design
-from tadcore.sampling.shapes import Sampler
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity, setups
@@ -52,8 +52,6 @@ from .store import Store
 from .table import schema_of
 from .trials import Trials
 from .warm_start import warm
-
-__all__ = ["StoppingRule", "Study", "StudyResult", "load_study"]
 
 _MOST_TRIALS = 2**32  # points of the Sobol' sequence
 
@@ -213,7 +211,8 @@ class Study:
             Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
         table : path, optional
             A file that keeps the game's table of transitions from study to study: read before, written after. With it
-            a study of the same game reuses the saved gain table; the outcomes are the same. Not used by an executor's workers.
+            a study of the same game reuses the saved gain table; the outcomes are the same. Not used by the workers
+            of an executor.
 
         Returns
         -------

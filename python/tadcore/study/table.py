@@ -26,8 +26,6 @@ from tadcore.sampling.design import CHUNK
 
 from .plan import Outcomes
 
-__all__ = ["FIXED", "digest", "encoded", "schema_of", "table_of"]
-
 FIXED = {"trial": pa.int64(), "kind": pa.int8(), "defender": pa.int32(), "time": pa.float64()}
 
 

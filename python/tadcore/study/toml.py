@@ -28,8 +28,6 @@ from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import is_owner
 
-__all__ = ["read_study"]
-
 _KEYS = {
     "scenario": "a bundled scenario's name, a file, or a table",
     "trials": "the number of games",

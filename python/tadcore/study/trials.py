@@ -11,17 +11,14 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore.game.outcome import OutcomeKind
+from tadcore.scenario.model import Scenario
+from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
 
 from .table import FIXED
 
 if TYPE_CHECKING:
     import pandas
     import polars
-
-    from tadcore.scenario.model import Scenario
-    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
-
-__all__ = ["Trials"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tadcore._shared.text import similar
 from tadcore.errors import ScenarioError
 from tadcore.sampling.adapters import as_sampler
-from tadcore.sampling.shapes import Sampler
+from tadcore.sampling.base import Sampler
+from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import beyond, expand, normal, short
 from tadcore.scenario.quantities import STATES, Quantity, quantities_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["quantities"]
 
 
 def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, Sampler], ...]:

@@ -7,13 +7,10 @@ import os
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tadcore._shared.files import strange, write_whole
 from tadcore.game.compiled import game_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
+from tadcore.scenario.model import Scenario
 
 NAME = "transitions.bin"
 """The file beside a store's parts."""

@@ -12,8 +12,6 @@ from tadcore.errors import ScenarioError, TadcoreError
 
 from .plan import Outcomes, Plan, run_chunk
 
-__all__ = ["LostWorkerError", "computed"]
-
 Job: TypeAlias = tuple[int, int]
 """A chunk and how many of its trials are wanted."""
 

@@ -18,8 +18,6 @@ from .checks.record import check_record
 from .checks.steps import check_steps
 from .report import VerificationReport, combine
 
-__all__ = ["verify"]
-
 
 def verify(
     sc_or_run: Scenario | Run,

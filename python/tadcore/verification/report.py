@@ -14,8 +14,6 @@ from typing import Any
 
 from tadcore.errors import UNDECIDED, VerificationError
 
-__all__ = ["Check", "Measurement", "VerificationReport"]
-
 
 @dataclass(frozen=True, slots=True)
 class Check:

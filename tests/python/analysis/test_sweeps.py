@@ -6,7 +6,7 @@ import pytest
 import tadcore
 from study_cases import CHUNK, ESCAPE, escaping, parts, study
 from tadcore import ScenarioError, Study, sweep
-from tadcore.sampling.shapes import Box
+from tadcore.sampling import Box
 
 
 def test_every_cell_is_the_study_of_its_scenario():

@@ -54,7 +54,7 @@ def test_a_valid_file_is_described(tadcore, tmp_path):
     code, out, err = tadcore("validate", place)
     assert (code, err) == (0, "")
     assert out.startswith(f"{place}: valid\n")
-    assert "d3       at (1, 2.5), sees 0.3 far" in out
+    assert "d3       at (1, 2.5), visibility radius 0.3" in out
 
 
 def test_bad_input_leaves_with_2_and_one_sentence(tadcore, tmp_path):

@@ -14,7 +14,7 @@ import tadcore
 from tadcore import ScenarioError
 from tadcore.cli.app import main
 from tadcore.report import report
-from tadcore.sampling.shapes import Disk
+from tadcore.sampling import Disk
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -7,8 +7,7 @@ import pytest
 from rich.console import Console
 
 from tadcore import scenarios
-from tadcore.reproduce import figures as paper
-from tadcore.reproduce import paper as module
+from tadcore.reproduce import figures as paper, paper as module
 from tadcore.reproduce.published import PUBLISHED
 
 # what an independent implementation computes for interaction I2

@@ -10,7 +10,7 @@ from scipy.stats import qmc
 
 from study_cases import calm, ring
 from tadcore import ScenarioError, Study, scenarios
-from tadcore.sampling.shapes import Annulus, Block, Box, Choice, Cycle, Disk, Gaussian, Sampler
+from tadcore.sampling import Annulus, Block, Box, Choice, Cycle, Disk, Gaussian, Sampler
 
 MANY = 8192
 

@@ -11,7 +11,7 @@ from study_cases import calm, resealed, study
 from tadcore import Scenario, ScenarioError, StoreError
 from tadcore._shared.files import parse_toml
 from tadcore.cli.app import main
-from tadcore.sampling.shapes import Box, Choice
+from tadcore.sampling import Box, Choice
 
 TEXT = tadcore.scenarios.load("paper-i1").to_toml()
 

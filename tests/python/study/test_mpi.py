@@ -11,7 +11,7 @@ import pytest
 
 import tadcore
 from study_cases import CHUNK
-from tadcore.sampling.shapes import Box
+from tadcore.sampling import Box
 
 MPIEXEC = shutil.which("mpiexec")
 pytestmark = pytest.mark.skipif(

@@ -21,7 +21,7 @@ from scipy import stats
 import tadcore
 from study_cases import CHUNK, edited, parts, resealed, ring, study
 from tadcore import StoreError
-from tadcore.sampling.shapes import Box, Choice
+from tadcore.sampling import Box, Choice
 from tadcore.study.manifest import Manifest
 
 HERE = Path(__file__).parents[1]

@@ -18,7 +18,7 @@ from scipy.stats import qmc
 import tadcore
 from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, parts, ring, study
 from tadcore import ScenarioError, Study
-from tadcore.sampling.shapes import Box, Cycle, Disk, Gaussian
+from tadcore.sampling import Box, Cycle, Disk, Gaussian
 
 
 def philox(seed, chunk, purpose, coordinates):

@@ -16,7 +16,7 @@ import tadcore
 from study_cases import CHUNK, calm, parts
 from tadcore import ScenarioError, Study
 from tadcore.cli.app import main
-from tadcore.sampling.shapes import Annulus, Box, Choice, Cycle, Disk, Gaussian
+from tadcore.sampling import Annulus, Box, Choice, Cycle, Disk, Gaussian
 
 FILE = """
 scenario = "calm.toml"

@@ -8,7 +8,7 @@ import pytest
 
 import tadcore
 from tadcore.game.compiled import game_of
-from tadcore.sampling.shapes import Box
+from tadcore.sampling import Box
 
 PLACES = {"attacker.position": Box([-3.0, -3.0], [3.0, 3.0])}
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore._shared.files import written
+from tadcore.game.recorded import Recorded
 
 from .frames import frames_of
 from .scene import Scene
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter
     from matplotlib.figure import Figure
 
-    from tadcore.game.recorded import Recorded
 
 _SUFFIXES = (".gif", ".mp4", ".html")
 

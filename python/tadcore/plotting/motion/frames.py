@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from tadcore.game.recorded import Recorded
+from tadcore.game.recorded import Recorded
 
 _PAUSE = 0.4  # seconds for which the picture stands still where the network changes
 _PAUSES = 4.0  # seconds of pauses in all; with many changes each is shorter, at last none

@@ -11,18 +11,17 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.run.network import draw_graph
 from tadcore.plotting.run.paths import disc
 from tadcore.plotting.tools.inset import filled
 from tadcore.plotting.tools.style import edge_text, look, outcome_text
 
+from .frames import Frame
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
-
-    from tadcore.game.recorded import Recorded
-
-    from .frames import Frame
 
 
 _RECENT = 0.15  # of the game: how long a trail stays strong

@@ -6,12 +6,11 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from tadcore import plotting
+from tadcore.game.recorded import Recorded
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Concatenate, ParamSpec, TypeVar
-
-    from tadcore.game.recorded import Recorded
 
     P = ParamSpec("P")
     Drawn = TypeVar("Drawn")

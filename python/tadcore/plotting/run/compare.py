@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, outcome_text
@@ -16,8 +17,6 @@ from .trajectories import trajectories
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.game.recorded import Recorded
 
 
 def compare(

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore.game.externality import control_jumps
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.style import PAGE, edge_text, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.game.recorded import Recorded
-
-__all__ = ["externality"]
 
 MAX_NAMED = 12
 """With more changes than this the edges are not named below the axis."""

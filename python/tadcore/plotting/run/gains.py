@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above, new_panels
 from tadcore.plotting.tools.style import look, symbol
 
@@ -16,8 +17,6 @@ from .series import MAX_VERTICALS, mark_changes, span
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.game.recorded import Recorded
 
 
 def gains(

@@ -10,14 +10,14 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.network import Edge
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import new_panels
 from tadcore.plotting.tools.style import look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.game.network import Edge
-    from tadcore.game.recorded import Recorded
 
 _NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
 _SMALL = 7.5  # points

@@ -10,13 +10,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above
 from tadcore.plotting.tools.style import look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.game.recorded import Recorded
 
 
 LAID_UNDER: Any = (0, (4, 2))

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 
+from tadcore.game.network import Edge
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.game.network import Edge
-    from tadcore.game.recorded import Recorded
 
 MAX_ROWS = 24
 """Where more edges than this are possible, `visibility` leaves out those that never form."""

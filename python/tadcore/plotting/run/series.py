@@ -9,14 +9,13 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.game.recorded import Recorded
 
 
 MAX_VERTICALS = 40

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
@@ -18,8 +19,6 @@ from .paths import disc, name_runs, paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.game.recorded import Recorded
 
 
 MAX_EDGE_LABELS = 12

@@ -14,12 +14,12 @@ from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.outcomes import boxes, input_label, outcome_look, parts_of, quantity_label, stack
 from tadcore.plotting.tools.style import COLUMN, symbol
+from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve
+from tadcore.statistics.sobol import Sensitivity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve
-    from tadcore.statistics.sobol import Sensitivity
 
 _ROW = 0.27  # inches for each row of a chart of rows
 

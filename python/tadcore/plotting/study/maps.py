@@ -12,12 +12,12 @@ from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.outcomes import boxes, outcome_look
 from tadcore.plotting.tools.style import COLUMN, PAGE, look, symbol
+from tadcore.scenario.model import Scenario
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-    from tadcore.scenario.model import Scenario
 
 _HATCHED = 240  # grid points along an axis from which hatches are cut; finer ones would print as noise
 _KINDS = ("timeout", "captured")

@@ -12,13 +12,11 @@ from tadcore._shared.arrays import Floats
 from tadcore.plotting.tools.axes import above, new_axes, new_panels
 from tadcore.plotting.tools.outcomes import boxes, input_label, parts_of, stack
 from tadcore.plotting.tools.style import COLUMN
-from tadcore.statistics import outcome_names
+from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.outcomes import indicators
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from tadcore.statistics import TrialOutcomes
 
 
 def outcomes_by_input(

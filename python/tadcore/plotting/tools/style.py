@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from tadcore.game.recorded import Recorded
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.backend_bases import RendererBase
 
-    from tadcore.game.recorded import Recorded
 
 COLUMN = 3.5
 """Width in inches of one journal column."""

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,17 +32,13 @@ from numpy.typing import ArrayLike
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
+from tadcore.scenario.model import Scenario
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 
 from .relaxation import Form, solve
-
-if TYPE_CHECKING:
-    from tadcore.game.network import VisibilityNetwork
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["ThetaBound", "theta_bound"]
 
 _TIGHT = 1e-6
 _FLOOR = 1e-6

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from tadcore._shared.arrays import Floats
-from tadcore.simulation.run import simulate
+from tadcore.simulation.run import Run, simulate
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.matrices import FeedbackSolution
 from tadcore.verification.report import Check, Measurement, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.simulation.run import Run
-
-__all__ = ["check_nafne", "gap_order", "sampling_gap"]
 
 _IDENTITY = 1e-10
 _REMEDY = "the values P(t) do not belong to this game, or the step is too long for the quadrature (‖C‖δ > 1)"

@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore.game.synthesis import synthesize, theta_terms
+from tadcore.simulation.run import Run
 from tadcore.verification.oracle.matrices import FeedbackSolution, stacked_rows
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
 if TYPE_CHECKING:
     import xarray
 
-    from tadcore.simulation.run import Run
-
-__all__ = ["check_consistency", "index_distance"]
 
 _ROWS, _THETA = 1e-9, 1e-16
 _SOURCE = "thm:consistency"

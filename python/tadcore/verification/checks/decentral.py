@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,15 +25,11 @@ from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.run import Run
 from tadcore.verification.oracle.matrices import Matrices, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.report import Check, Measurement, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-    from tadcore.simulation.run import Run
-
-__all__ = ["Decentralised", "check_decentral", "decentralise"]
 
 _OPTIMUM = 1e-8
 _SILENT = 1e-10

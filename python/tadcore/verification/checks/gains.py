@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +19,12 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.run import Run
 from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_clarabel
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.report import Check, Measurement, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-    from tadcore.simulation.run import Run
-
-__all__ = ["CertificateRates", "certificate_rates", "check_gains", "lowest_curvature", "multistart"]
 
 _GRADIENT, _CURVATURE, _LOWER, _BELOW = 1e-9, 1e-9, 1e-8, 1e-10
 _DENSE = 400

@@ -9,20 +9,14 @@ moved; one whose defenders are renamed, the same with other names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
-from tadcore.simulation.run import simulate
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.run import Run, simulate
 from tadcore.verification.report import Check, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-    from tadcore.simulation.run import Run
-
-__all__ = ["check_geometry", "moved", "off_the_line", "radius_delay", "relabelled", "unlike"]
 
 _LINE, _SAME, _DECIDED = 1e-10, 1e-8, 1e-11
 

@@ -10,21 +10,15 @@ Two questions, each by SciPy and from the scenario's weights alone.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.scenario.model import Scenario
 from tadcore.verification.oracle.flow import riccati_within
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, stacked_rows
 from tadcore.verification.oracle.responses import REGRET, best_responses, is_smooth
 from tadcore.verification.report import Check, Measurement, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["check_equilibrium", "riccati_defect"]
 
 _FEWEST, _MOST = 800, 6400
 _DEFECT, _TERMINAL, _FEEDBACK = 1e-10, 1e-14, 1e-12

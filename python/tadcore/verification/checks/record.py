@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore.simulation.run import Run
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.indices import adapted_weights, theta_terms
 from tadcore.verification.oracle.matrices import FeedbackSolution, stacked_rows
 from tadcore.verification.report import Check, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.simulation.run import Run
-
-__all__ = ["check_record"]
 
 _MOTION, _CONTROL, _ADMISSIBLE, _THETA, _RIM = 1e-10, 1e-12, 1e-12, 1e-10, 1e-9
 

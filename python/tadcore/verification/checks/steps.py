@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,15 +17,10 @@ from numpy.typing import ArrayLike
 from tadcore._shared.arrays import as_index
 from tadcore.game.chattering import Chatter, chatter
 from tadcore.game.outcome import Outcome
+from tadcore.scenario.model import Scenario
 from tadcore.simulation.batch import simulate_batch
-from tadcore.simulation.run import simulate
+from tadcore.simulation.run import Run, simulate
 from tadcore.verification.report import Check, Measurement, VerificationReport
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-    from tadcore.simulation.run import Run
-
-__all__ = ["Refinement", "StepStudy", "check_steps", "refine_batch", "step_study"]
 
 _SHOWN = 5
 

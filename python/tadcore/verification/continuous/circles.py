@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,8 @@ from scipy.linalg import expm
 from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
+from tadcore.scenario.model import Scenario
 from tadcore.verification.oracle.matrices import matrices_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
 
 _DEGREE = 16
 

@@ -17,7 +17,6 @@ no unique continuation: the play then stops and says so.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,14 +24,10 @@ from scipy.optimize import brentq
 from tadcore._shared.arrays import Floats
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
+from tadcore.scenario.model import Scenario
 
 from .circles import Circles, Loops, flow
 from .plays import Event, EventPlay, Slide
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["play_by_events"]
 
 _PARTS = 4
 _EVENTS_PER_STEP = 40

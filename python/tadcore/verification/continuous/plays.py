@@ -8,8 +8,6 @@ from tadcore._shared.arrays import Floats
 from tadcore.game.network import Edge
 from tadcore.game.outcome import Outcome
 
-__all__ = ["Event", "EventPlay", "Slide"]
-
 
 @dataclass(frozen=True)
 class Event:

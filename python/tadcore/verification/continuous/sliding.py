@@ -10,24 +10,17 @@ looks at the circle, the other never flips.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
-from tadcore.simulation.run import simulate
+from tadcore.game.network import Edge
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.run import Run, simulate
 from tadcore.verification.checks.steps import refined
 
 from .events import play_by_events
-
-if TYPE_CHECKING:
-    from tadcore.game.network import Edge
-    from tadcore.scenario.model import Scenario
-    from tadcore.simulation.run import Run
-
-    from .plays import EventPlay
-
-__all__ = ["SlidingStudy", "sliding_study"]
+from .plays import EventPlay
 
 
 @dataclass(frozen=True, eq=False)

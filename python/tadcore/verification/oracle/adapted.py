@@ -25,22 +25,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.simulation.run import Run
 
 from .flow import integral, propagate, riccati_within
 from .indices import AdaptedWeights, adapted_weights, integrands
 from .matrices import FeedbackSolution, Matrices, matrices_of
-
-if TYPE_CHECKING:
-    from tadcore.simulation.run import Run
-
-__all__ = ["Adapted", "Deviation", "Index"]
 
 _PIECES = 64
 

@@ -15,18 +15,13 @@ control (…, players, dim), so every quadratic form sums over the axes and the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.model import Scenario
 
 from .matrices import Matrices
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["AdaptedWeights", "adapted_weights", "integrands", "theta_terms"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,14 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
+from tadcore.scenario.model import Scenario
 
 
 class FeedbackSolution(Protocol):

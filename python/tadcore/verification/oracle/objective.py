@@ -7,19 +7,13 @@ Gradients are eq:errgradient; Θ is divided by the number of axes, so at reduced
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.model import Scenario
 
 from .matrices import Matrices
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["FullObjective"]
 
 
 class FullObjective:

@@ -17,21 +17,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.model import Scenario
 
 from .flow import TooStiffError
 from .matrices import Matrices, matrices_of
-
-if TYPE_CHECKING:
-    from tadcore.scenario.model import Scenario
-
-__all__ = ["REGRET", "BestResponse", "best_responses", "is_smooth"]
 
 REGRET = 1e-9
 """The largest regret, relative to its scale, that counts as none."""
