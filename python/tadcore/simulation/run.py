@@ -19,7 +19,6 @@ from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_
 from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
 from tadcore.game.outcome import Outcome
-from tadcore.plotting import Animation
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
 
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
     import os
 
     import xarray
+
+    from tadcore.plotting import Animation
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,7 +156,6 @@ class Run:
         ValueError
             A number is not positive.
         """
-        from tadcore.plotting import Animation
 
         return Animation(self, seconds=seconds, fps=fps, width=width)
 

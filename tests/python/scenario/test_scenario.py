@@ -219,7 +219,7 @@ def test_repr_and_description_are_short():
     sc = scenarios.load("paper-i1")
     assert repr(sc) == "Scenario(I1, 3 defenders, dim=2, T=6, δ=0.005)"
     assert len(sc.describe().splitlines()) == 2 + 5
-    assert "d2       at (1, 1.5), sees 2.25 far, captures within 0.1" in sc.describe()
+    assert "d2       at (1, 1.5), visibility radius 2.25, captures within 0.1" in sc.describe()
 
 
 def test_the_bundled_scenarios_are_the_eight_runs():

@@ -63,7 +63,7 @@ def test_an_unknown_keyword_is_refused_everywhere():
 STUDIED = ["study", "plotting", "report", "statistics"]
 
 
-@pytest.mark.parametrize("name", ["game", "game.synthesis", "simulation", "analysis", *STUDIED])
+@pytest.mark.parametrize("name", ["game", "simulation", "analysis", *STUDIED])
 def test_every_parameter_is_documented(name):
     pytest.importorskip("tadcore._core")
     module = importlib.import_module(f"tadcore.{name}")
