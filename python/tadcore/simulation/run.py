@@ -156,6 +156,7 @@ class Run:
         ValueError
             A number is not positive.
         """
+        from tadcore.plotting import Animation
 
         return Animation(self, seconds=seconds, fps=fps, width=width)
 
