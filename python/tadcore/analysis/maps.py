@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
@@ -203,7 +203,7 @@ def check_destination(field: str, path: Path) -> None:
         raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
 
 
-def _axis(field: str, given: Sequence[Any]) -> NDArray[np.float64]:
+def _axis(field: str, given: Sequence[Any]) -> Floats:
     try:
         low, high, count = given
         ends = float(low), float(high)

@@ -29,9 +29,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from tadcore._shared.arrays import Floats
 from tadcore._shared.files import parse_toml, read_text, write_whole
 from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
@@ -219,18 +219,18 @@ class Scenario(CheckedModel):
         return tuple(own)
 
     @property
-    def positions(self) -> NDArray[np.float64]:
+    def positions(self) -> Floats:
         """Initial positions, shape (n + 2, dim), in the order of `players`."""
         return np.array([*(d.position for d in self.defenders), self.target.position, self.attacker.position])
 
     @property
-    def visibility_radii(self) -> NDArray[np.float64]:
+    def visibility_radii(self) -> Floats:
         """ζ of the `constrained` players, shape (n,) in I1 and (n + 1,) in I2."""
         radii = [d.visibility_radius for d in self.defenders]
         return np.array([*radii, self.target.visibility_radius] if self.interaction == "I2" else radii)
 
     @property
-    def capture_radii(self) -> NDArray[np.float64]:
+    def capture_radii(self) -> Floats:
         """σ_d1 … σ_dn and σ_a, shape (n + 1,)."""
         return np.array([*(d.capture_radius for d in self.defenders), self.attacker.capture_radius])
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 
 from .model import Scenario
@@ -73,9 +73,7 @@ def component(sc: Scenario, path: Any) -> Quantity:
     return found
 
 
-def setups(
-    sc: Scenario, varied: tuple[Quantity, ...], values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[Floats, Floats, Floats]:
     """Positions (M, n + 2, dim), visibility and capture radii from one column for each component.
 
     Radii have one row for each trial, (M, m) and (M, n + 1), or where none of their kind varies one for all.

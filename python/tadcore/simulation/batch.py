@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_index, as_positions
+from tadcore._shared.arrays import Floats, as_index, as_positions
 from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, OutcomeKind
 from tadcore.scenario.model import Scenario
@@ -37,7 +37,7 @@ class Batch:
 
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
-    time: NDArray[np.float64]
+    time: Floats
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import as_real, refuse_where
+from tadcore._shared.arrays import Floats, as_real, refuse_where
 from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
 
-def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> Floats:
     """ζ of the m players with limited sight, one row for each game or one for all; the scenario's by default."""
     m = len(sc.constrained)
     shared = f"the radii of {', '.join(sc.constrained)}"
@@ -25,16 +25,14 @@ def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArr
     return _rows("visibility_radii", given, games, m, shared, "visibility_radius")
 
 
-def capture_rows(sc: Scenario, values: ArrayLike | None, games: int) -> NDArray[np.float64]:
+def capture_rows(sc: Scenario, values: ArrayLike | None, games: int) -> Floats:
     """σ of the defenders and the attacker, one row for each game or one for all; the scenario's by default."""
     shared = f"the radii of {', '.join(sc.players[: sc.n])}, attacker"
     given = as_real("capture_radii", sc.capture_radii if values is None else values, f"numbers: {shared}")
     return _rows("capture_radii", given, games, sc.n + 1, shared, "capture_radius")
 
 
-def _rows(
-    name: str, given: NDArray[np.float64], games: int, columns: int, meaning: str, field: str
-) -> NDArray[np.float64]:
+def _rows(name: str, given: Floats, games: int, columns: int, meaning: str, field: str) -> Floats:
     """One row of positive radii for each game, or a single one for all."""
     if given.shape not in ((columns,), (games, columns)):
         shape = f"of shape ({columns},) or ({games}, {columns}): {meaning}"
@@ -44,7 +42,7 @@ def _rows(
     return np.ascontiguousarray(np.atleast_2d(given))
 
 
-def compare(capture: NDArray[np.float64], sight: NDArray[np.float64], n: int) -> None:
+def compare(capture: Floats, sight: Floats, n: int) -> None:
     """Whoever intercepts sees the attacker: σ < ζ for every defender."""
     bad = ~sees_whom_it_intercepts(capture[:, :n], sight[:, :n])
     shown = np.broadcast_to(sight[:, :n], bad.shape)

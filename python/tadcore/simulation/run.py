@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import as_amount
+from tadcore._shared.arrays import Floats, as_amount
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
@@ -71,13 +71,13 @@ class Run:
 
     scenario: Scenario
     outcome: Outcome
-    times: NDArray[np.float64]
-    position: NDArray[np.float64]
-    control: NDArray[np.float64]
+    times: Floats
+    position: Floats
+    control: Floats
     adjacency: NDArray[np.bool_]
-    gains: NDArray[np.float64]
-    theta: NDArray[np.float64]
-    theta_terms: NDArray[np.float64]
+    gains: Floats
+    theta: Floats
+    theta_terms: Floats
     costs: dict[str, float]
     iterations: int
     unconverged: int

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component, setups
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
 from tadcore.errors import ScenarioError
 from tadcore.sampling.base import Block, Sampler
@@ -28,8 +29,8 @@ class Outcomes(NamedTuple):
 
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
-    time: NDArray[np.float64]
-    inputs: NDArray[np.float64]
+    time: Floats
+    inputs: Floats
     """What was drawn, one column for each varied component."""
 
 
@@ -57,7 +58,7 @@ class Plan:
         """Names of the inputs, one for each varied component."""
         return tuple(name for quantity in self.quantities for name in quantity.columns)
 
-    def draw(self, chunk: int, rows: int = CHUNK) -> NDArray[np.float64]:
+    def draw(self, chunk: int, rows: int = CHUNK) -> Floats:
         """Inputs of the first ``rows`` trials of a chunk, shape (rows, columns).
 
         The chunk is always drawn whole and then cut: what a trial draws cannot depend on how many follow.
@@ -70,7 +71,7 @@ class Plan:
         ]
         return np.concatenate(drawn, axis=1)[:rows] if drawn else np.empty((rows, 0))
 
-    def check(self, chunk: int, inputs: NDArray[np.float64]) -> None:
+    def check(self, chunk: int, inputs: Floats) -> None:
         """Raise `ScenarioError` for the first trial of a chunk whose draws are no game: its path, number and value."""
         fields = [(name, quantity.field) for quantity in self.quantities for name in quantity.columns]
         for values, (name, field) in zip(inputs.T, fields, strict=True):
@@ -110,7 +111,7 @@ class Plan:
         pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
         return all(capture[1] < sight[0] for capture, sight in pairs)
 
-    def _refuse(self, chunk: int, path: str, values: NDArray[np.float64], bad: NDArray[np.bool_], rule: str) -> None:
+    def _refuse(self, chunk: int, path: str, values: Floats, bad: NDArray[np.bool_], rule: str) -> None:
         if bad.any():
             row = int(bad.argmax())
             raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), rule)

@@ -30,9 +30,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
@@ -159,7 +158,7 @@ class Study:
         """Names of the inputs, one for each varied component."""
         return self._plan.columns
 
-    def inputs(self, trials: int | None = None) -> dict[str, NDArray[np.float64]]:
+    def inputs(self, trials: int | None = None) -> dict[str, Floats]:
         """Draw without playing: the inputs of the first trials, all of them by default, by the name of the column.
 
         Parameters

@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
@@ -45,12 +46,12 @@ class Trials:
         return self._column("defender")
 
     @cached_property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Floats:
         """The instant of the end, shape (trials,)."""
         return self._column("time")
 
     @cached_property
-    def inputs(self) -> dict[str, NDArray[np.float64]]:
+    def inputs(self) -> dict[str, Floats]:
         """What was drawn: an array of shape (trials,) for each varied component, by the name of its column."""
         return {name: self._column(name) for name in self.table.column_names if name not in FIXED}
 
