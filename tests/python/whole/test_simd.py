@@ -1,10 +1,8 @@
 """The vector instructions that TADCORE_SIMD chooses: which are refused, and that all of them give one answer."""
 
-import os
-import subprocess
-import sys
-
 import pytest
+
+from widths import python, widths
 
 PLAY = """
 import hashlib, numpy as np, tadcore
@@ -15,20 +13,6 @@ numbers = [run.position, run.control, run.gains, batch.kind, batch.defender, bat
 digest = hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in numbers)).hexdigest()
 print(tadcore._core.simd(), digest)
 """
-
-
-def python(code, simd):
-    """A fresh interpreter in which the variable says this, or is not there."""
-    environment = {name: value for name, value in os.environ.items() if name != "TADCORE_SIMD"}
-    if simd is not None:
-        environment["TADCORE_SIMD"] = simd
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
-
-
-def widths():
-    """What this processor has, by what the refusal of a wrong word says."""
-    refused = python("import tadcore; tadcore._core.simd()", "none").stderr
-    return refused.strip().rsplit("this processor has ", 1)[1].split(", ")
 
 
 def test_every_width_of_the_processor_can_be_chosen_and_gives_the_same_bits():
@@ -44,7 +28,8 @@ def test_every_width_of_the_processor_can_be_chosen_and_gives_the_same_bits():
 def test_an_unknown_word_is_refused_by_name(value):
     code = """
 import tadcore
-for call in (tadcore._core.simd, lambda: tadcore.simulate(tadcore.scenarios.load("paper-i1"))):
+from tadcore import _core
+for call in (_core.simd, lambda: tadcore.simulate(tadcore.scenarios.load("paper-i1"))):
     try:
         call()
     except tadcore.errors.TadcoreError as error:
