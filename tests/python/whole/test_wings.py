@@ -4,6 +4,7 @@ Every import counts: those of annotations and those inside functions too, in mod
 """
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,13 @@ def upward(name, path, text):
 
 def test_every_wing_has_its_floor():
     assert {name.split(".")[1] for name in KNOWN} == set(FLOOR)
+
+
+def test_contributing_shows_the_same_order():
+    page = (Path(__file__).parents[3] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    table = page.partition("<!-- wings")[2].partition("<!-- end of wings")[0]
+    rows = re.findall(r"^\| \d+ \| (.+?) \|", table, flags=re.MULTILINE)
+    assert tuple(tuple(re.findall(r"`(\w+)`", row)) for row in rows) == FLOORS[:-1]
 
 
 def test_every_import_points_down():
