@@ -9,12 +9,14 @@
 //! | `tile`, `factor`, `factor_one` | factorisation of small symmetric matrices, and the solves that go with it |
 //! | `tasks` | lists of descents: where they start, what they reached |
 //! | `workspace` | scratch memory |
+//! | `objective` | what a function to be minimised must give |
 //! | `minimise` | the descents |
 
 mod factor;
 mod factor_one;
 mod layout;
 mod minimise;
+mod objective;
 mod tasks;
 mod tile;
 mod variables;
@@ -24,7 +26,8 @@ pub(crate) use factor::{Means, factorise};
 #[cfg(test)]
 pub(crate) use layout::packed;
 pub(crate) use layout::{Form, Layout, Slot};
-pub(crate) use minimise::{Objective, minimise};
+pub(crate) use minimise::minimise;
+pub(crate) use objective::Objective;
 pub use tasks::Status;
 pub(crate) use tasks::{Limits, Owner, Reached, Rival, Tasks};
 pub(crate) use variables::{Variable, advance, balance};
