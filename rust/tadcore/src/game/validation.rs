@@ -3,8 +3,13 @@
 use super::{Interaction, Weights};
 use crate::error::GameError;
 
+/// Whether a number is positive and finite, as weights, times and capture radii are.
+pub(crate) fn is_positive(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
 pub(crate) fn positive(field: &str, value: f64) -> Result<(), GameError> {
-    rule(field, value, value > 0.0 && value.is_finite(), "a positive finite number")
+    rule(field, value, is_positive(value), "a positive finite number")
 }
 
 /// What a weight may be: far beyond any game, and such that Θ, of the order of (P²/r)², stays within a double.

@@ -2,7 +2,7 @@
 
 use crate::error::GameError;
 use crate::game::Game;
-use crate::game::validation::{FARTHEST, positive, rule};
+use crate::game::validation::{FARTHEST, is_positive, positive, rule};
 
 /// Positions and radii of one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,22 +36,24 @@ impl Setup<'_> {
             }
         }
         // A name is put together only for a number that breaks its rule: this runs for every trial of an ensemble.
+        let refuse = |field: &str, value: f64, words: &'static str| rule(field, value, false, words);
         if let Some(e) = self.positions.iter().position(|x| !x.is_finite()) {
             let field = format!("positions[{}, {}]", e / self.dim, e % self.dim);
-            rule(&field, self.positions[e], false, "a finite number")?;
+            refuse(&field, self.positions[e], "a finite number")?;
         }
         if let Some(e) = self.positions.iter().position(|x| x.abs() > FARTHEST) {
             let field = format!("positions[{}, {}]", e / self.dim, e % self.dim);
-            rule(&field, self.positions[e], false, "between -1e100 and 1e100")?;
+            refuse(&field, self.positions[e], "between -1e100 and 1e100")?;
         }
+        // 0 < ζ ≤ ∞, and 0 < σ < ζ for the defenders.
         if let Some(i) = self.visibility.iter().position(|&zeta| zeta.is_nan() || zeta <= 0.0) {
-            rule(&format!("visibility_radii[{i}]"), self.visibility[i], false, "a positive number or infinity")?;
+            refuse(&format!("visibility_radii[{i}]"), self.visibility[i], "a positive number or infinity")?;
         }
-        if let Some(i) = self.capture.iter().position(|&sigma| !(sigma > 0.0 && sigma.is_finite())) {
+        if let Some(i) = self.capture.iter().position(|&sigma| !is_positive(sigma)) {
             positive(&format!("capture_radii[{i}]"), self.capture[i])?;
         }
         if let Some(i) = (0..n).find(|&i| self.capture[i] >= self.visibility[i]) {
-            rule(&format!("capture_radii[{i}]"), self.capture[i], false, "smaller than the visibility radius")?;
+            refuse(&format!("capture_radii[{i}]"), self.capture[i], "smaller than the visibility radius")?;
         }
         Ok(())
     }
