@@ -7,7 +7,7 @@ MUTANTS = {
         ("seen by whom", "wrapping_add(mix(«!players[i].colour»))", "players[i].colour"),
         ("places of a kind", "order[at] = «i»;", "at"),
     ],
-    "policy/transitions.rs": [
+    "policy/filler.rs": [
         ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),
         ("a solved entry under its own name", "out[«j * rows + i»] = x", "i * rows + j"),
     ],

@@ -12,8 +12,8 @@ use crate::error::RunError;
 use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
+use crate::policy::filler::Filler;
 use crate::policy::step_table::Shelf;
-use crate::policy::transitions::Filler;
 use crate::simd::Width;
 use crate::simulation::{Outcome, Reach};
 
@@ -100,7 +100,7 @@ impl<'a> Chunk<'a> {
                 w.missing.sort_unstable();
                 w.missing.dedup();
                 w.local.clear();
-                misses += self.policy.fill(k, &w.missing, &mut w.local, &mut w.filler, cancel)?;
+                misses += w.filler.fill(self.policy, k, &w.missing, &mut w.local, cancel)?;
                 self.follow(k, w);
             }
             if self.strips.live == 0 {

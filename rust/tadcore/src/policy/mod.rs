@@ -14,6 +14,7 @@
 mod budget;
 pub mod closed_loop;
 pub mod exponential;
+pub(crate) mod filler;
 mod hash_table;
 pub(crate) mod index;
 mod relabelling;
@@ -28,7 +29,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub use table::{DEFAULT_TABLE_BYTES, TableStats};
 
 use crate::cancel::CancelToken;
-use crate::error::EquilibriumError;
+use crate::error::{EquilibriumError, TableError};
 use crate::game::Game;
 use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
@@ -98,7 +99,7 @@ impl Policy {
         let transitions = &self.transitions;
         let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         TableStats {
-            entries: self.table.entries() + transitions.entries.load(Ordering::Relaxed),
+            entries: self.table.entries() + transitions.entries(),
             hits: load(&self.table.hits) + load(&transitions.hits),
             misses: load(&self.table.misses) + load(&transitions.misses),
             bytes: self.budget.used(),
@@ -160,5 +161,23 @@ impl Policy {
             transition: relabelling::back(&order, &transition),
             attacker: own,
         }
+    }
+    /// The table of transitions as bytes.
+    #[must_use]
+    pub fn save_transitions(&self) -> Vec<u8> {
+        saved::write(&self.transitions, &self.game)
+    }
+
+    /// Adds the entries of a saved table, as far as the budget goes; says how many there are now.
+    ///
+    /// # Errors
+    /// [`TableError`] for bytes that are no table, or one of another game, version or format; nothing is added then.
+    pub fn load_transitions(&self, bytes: &[u8]) -> Result<usize, TableError> {
+        let (rows, size) = (self.game.constrained(), self.game.size());
+        saved::read(bytes, &self.game, |step, key, matrix| {
+            let model = self.kinds.some().then(|| self.kinds.model(&Topology::from_words(rows, size, key)).0);
+            self.transitions.keep(step, key, model.as_ref().map(Topology::words), matrix, &self.budget);
+        })?;
+        Ok(self.transitions.entries())
     }
 }

@@ -5,11 +5,10 @@
 //! eight bytes are a checksum of all before. The fingerprint covers every weight, the grid and the version of this
 //! crate, since another version may choose other gains.
 
-use super::Policy;
 use super::step_table::padded;
+use super::transitions::Transitions;
 use crate::error::TableError;
 use crate::game::{Game, Interaction};
-use crate::network::Topology;
 
 const MAGIC: &[u8; 8] = b"tadtable";
 const FORMAT: u32 = 1;
@@ -52,100 +51,112 @@ impl Reader<'_> {
     }
 }
 
-impl Policy {
-    fn words(&self) -> usize {
-        (self.game.constrained() * self.game.size()).div_ceil(64)
+/// What a table of a game looks like in bytes.
+struct Shape {
+    size: usize,
+    constrained: usize,
+    steps: usize,
+    /// Words of a key.
+    words: usize,
+    /// Bytes of an entry.
+    entry: usize,
+    fingerprint: u64,
+}
+
+impl Shape {
+    fn of(game: &Game) -> Self {
+        let (size, constrained) = (game.size(), game.constrained());
+        let words = (constrained * size).div_ceil(64);
+        let (entry, steps) = (8 * (1 + words + size * size), game.grid().steps());
+        Self { size, constrained, steps, words, entry, fingerprint: fingerprint(game) }
     }
 
-    fn entry_len(&self) -> usize {
-        8 * (1 + self.words() + self.game.size().pow(2))
+    /// The numbers that follow the format.
+    fn numbers(&self) -> [u32; 3] {
+        [self.size as u32, self.constrained as u32, self.steps as u32]
     }
 
-    /// The table of transitions as bytes.
-    #[must_use]
-    pub fn save_transitions(&self) -> Vec<u8> {
-        let (size, steps) = (self.game.size(), self.game.grid().steps());
-        let mut out = Vec::new();
-        out.extend_from_slice(MAGIC);
-        for number in [FORMAT, size as u32, self.game.constrained() as u32, steps as u32] {
-            out.extend_from_slice(&number.to_le_bytes());
-        }
-        out.extend_from_slice(&fingerprint(&self.game).to_le_bytes());
-        let count_at = out.len();
-        out.extend_from_slice(&[0; 8]);
-        let mut count = 0u64;
-        for step in 0..steps {
-            let shelf = self.transitions.shelf(step);
-            count += shelf.len() as u64;
-            out.reserve(shelf.len() * self.entry_len());
-            for (i, key) in shelf.keys().enumerate() {
-                out.extend_from_slice(&(step as u64).to_le_bytes());
-                key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
-                for column in shelf.matrix(i + 1).chunks_exact(padded(size)) {
-                    column[..size].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
-                }
-            }
-        }
-        out[count_at..count_at + 8].copy_from_slice(&count.to_le_bytes());
-        out.extend_from_slice(&checksum(&out).to_le_bytes());
-        out
-    }
-
-    /// Adds the entries of a saved table, as far as the budget goes; says how many there are now.
-    ///
-    /// # Errors
-    /// [`TableError`] for bytes that are no table, or one of another game, version or format; nothing is added then.
-    pub fn load_transitions(&self, bytes: &[u8]) -> Result<usize, TableError> {
-        let (size, steps) = (self.game.size(), self.game.grid().steps());
-        if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
-            return Err(TableError::Foreign);
-        }
-        let mut reader = Reader(&bytes[8..]);
-        let format = reader.u32();
-        if format != FORMAT {
-            return Err(TableError::Format { found: format, expected: FORMAT });
-        }
-        let shape = [reader.u32(), reader.u32(), reader.u32()];
-        let (print, count) = (reader.u64(), reader.u64());
-        if shape != [size as u32, self.game.constrained() as u32, steps as u32] || print != fingerprint(&self.game) {
-            return Err(TableError::OtherGame);
-        }
-        let body = bytes.len() - HEADER - 8;
-        let (data, sum) = bytes.split_at(bytes.len() - 8);
-        let whole = count.checked_mul(self.entry_len() as u64) == Some(body as u64);
-        if !whole || Reader(sum).u64() != checksum(data) {
-            return Err(TableError::Damaged);
-        }
-        let (rows, mut key) = (padded(size), vec![0; self.words()]);
-        let mut matrix = vec![0.0; size * rows];
-        let entries = bytes[HEADER..bytes.len() - 8].chunks_exact(self.entry_len());
-        // The checksum tells an accident, not an intention: what is read must be an entry of this table.
-        let bits = (self.game.constrained() * size) % 64;
+    /// Whether the bytes of an entry are one of such a table: a checksum tells an accident, not an intention.
+    fn holds(&self, entry: &[u8]) -> bool {
+        let bits = (self.constrained * self.size) % 64;
         let beyond = if bits == 0 { 0 } else { u64::MAX << bits };
-        let valid = |entry: &[u8]| {
-            let mut reader = Reader(entry);
-            let step = reader.u64();
-            let last = (0..self.words()).map(|_| reader.u64()).last().unwrap_or(0);
-            step < steps as u64
-                && last & beyond == 0
-                && (0..size * size).all(|_| f64::from_bits(reader.u64()).is_finite())
-        };
-        if !entries.clone().all(valid) {
-            return Err(TableError::Damaged);
-        }
-        for entry in entries {
-            let mut reader = Reader(entry);
-            let step = reader.u64() as usize;
-            key.iter_mut().for_each(|word| *word = reader.u64());
-            for column in matrix.chunks_exact_mut(rows) {
-                column[..size].iter_mut().for_each(|x| *x = f64::from_bits(reader.u64()));
-            }
-            let model = self
-                .kinds
-                .some()
-                .then(|| self.kinds.model(&Topology::from_words(self.game.constrained(), size, &key)).0);
-            self.transitions.keep(step, &key, model.as_ref().map(Topology::words), &matrix, &self.budget);
-        }
-        Ok(self.transitions.entries.load(std::sync::atomic::Ordering::Relaxed))
+        let mut reader = Reader(entry);
+        let step = reader.u64();
+        let last = (0..self.words).map(|_| reader.u64()).last().unwrap_or(0);
+        step < self.steps as u64
+            && last & beyond == 0
+            && (0..self.size * self.size).all(|_| f64::from_bits(reader.u64()).is_finite())
     }
+}
+
+/// The table of transitions of a game as bytes.
+pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
+    let shape = Shape::of(game);
+    let mut out = Vec::new();
+    out.extend_from_slice(MAGIC);
+    for number in std::iter::once(FORMAT).chain(shape.numbers()) {
+        out.extend_from_slice(&number.to_le_bytes());
+    }
+    out.extend_from_slice(&shape.fingerprint.to_le_bytes());
+    let count_at = out.len();
+    out.extend_from_slice(&[0; 8]);
+    let mut count = 0u64;
+    for step in 0..shape.steps {
+        let shelf = transitions.shelf(step);
+        count += shelf.len() as u64;
+        out.reserve(shelf.len() * shape.entry);
+        for (i, key) in shelf.keys().enumerate() {
+            out.extend_from_slice(&(step as u64).to_le_bytes());
+            key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
+            for column in shelf.matrix(i + 1).chunks_exact(padded(shape.size)) {
+                column[..shape.size].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+            }
+        }
+    }
+    out[count_at..count_at + 8].copy_from_slice(&count.to_le_bytes());
+    out.extend_from_slice(&checksum(&out).to_le_bytes());
+    out
+}
+
+/// Hands the entries of a saved table to `each`: step, key and padded matrix.
+///
+/// # Errors
+/// [`TableError`] for bytes that are no table, or one of another game, version or format; no entry is handed over then.
+pub(super) fn read(bytes: &[u8], game: &Game, mut each: impl FnMut(usize, &[u64], &[f64])) -> Result<(), TableError> {
+    let shape = Shape::of(game);
+    if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
+        return Err(TableError::Foreign);
+    }
+    let mut reader = Reader(&bytes[8..]);
+    let format = reader.u32();
+    if format != FORMAT {
+        return Err(TableError::Format { found: format, expected: FORMAT });
+    }
+    let numbers = [reader.u32(), reader.u32(), reader.u32()];
+    let (print, count) = (reader.u64(), reader.u64());
+    if numbers != shape.numbers() || print != shape.fingerprint {
+        return Err(TableError::OtherGame);
+    }
+    let (data, sum) = bytes.split_at(bytes.len() - 8);
+    let body = &data[HEADER..];
+    let whole = count.checked_mul(shape.entry as u64) == Some(body.len() as u64);
+    if !whole || Reader(sum).u64() != checksum(data) {
+        return Err(TableError::Damaged);
+    }
+    let entries = body.chunks_exact(shape.entry);
+    if !entries.clone().all(|entry| shape.holds(entry)) {
+        return Err(TableError::Damaged);
+    }
+    let rows = padded(shape.size);
+    let (mut key, mut matrix) = (vec![0; shape.words], vec![0.0; shape.size * rows]);
+    for entry in entries {
+        let mut reader = Reader(entry);
+        let step = reader.u64() as usize;
+        key.iter_mut().for_each(|word| *word = reader.u64());
+        for column in matrix.chunks_exact_mut(rows) {
+            column[..shape.size].iter_mut().for_each(|x| *x = f64::from_bits(reader.u64()));
+        }
+        each(step, &key, &matrix);
+    }
+    Ok(())
 }

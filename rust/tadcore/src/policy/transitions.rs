@@ -10,25 +10,18 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 use std::time::Duration;
 
-use super::Policy;
 use super::budget::Budget;
-use super::closed_loop::FreeRows;
-use super::step_table::{Shelf, padded};
+use super::step_table::Shelf;
 use crate::cancel::CancelToken;
 use crate::error::Cancelled;
 use crate::network::Topology;
-use crate::synthesis::{Problem, SIDE_BY_SIDE_UP_TO, Synthesizer};
 
 /// How long a thread waits for an entry that another one solves before it looks at its cancel token again.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// Entries that a thread claims and solves at once, side by side: enough to keep eight lanes full, and few enough for
-/// other threads to have their share and for a cancellation to be noticed soon.
-const GROUP: usize = 64;
-
 /// Entries of one instant that a thread is solving right now.
 #[derive(Debug, Default)]
-struct Claims {
+pub(super) struct Claims {
     held: Mutex<Held>,
     released: Condvar,
 }
@@ -41,7 +34,7 @@ struct Held {
 }
 
 /// A claim; dropping it, also by a panic or a cancellation, lets the others go on.
-struct Claim<'a> {
+pub(super) struct Claim<'a> {
     claims: &'a Claims,
     topology: &'a Topology,
 }
@@ -51,12 +44,12 @@ impl Claims {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn claim<'a>(&'a self, topology: &'a Topology) -> Option<Claim<'a>> {
+    pub(super) fn claim<'a>(&'a self, topology: &'a Topology) -> Option<Claim<'a>> {
         let free = self.lock().topologies.insert(topology.clone());
         free.then(|| Claim { claims: self, topology })
     }
 
-    fn wait(&self, topology: &Topology, cancel: &CancelToken) -> Result<(), Cancelled> {
+    pub(super) fn wait(&self, topology: &Topology, cancel: &CancelToken) -> Result<(), Cancelled> {
         let mut held = self.lock();
         while held.topologies.contains(topology) {
             cancel.check()?;
@@ -85,7 +78,7 @@ pub(crate) struct Transitions {
     claims: Vec<Claims>,
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
-    pub(super) entries: AtomicUsize,
+    entries: AtomicUsize,
 }
 
 impl Transitions {
@@ -102,6 +95,16 @@ impl Transitions {
     /// The shelf of an instant, for reading.
     pub(crate) fn shelf(&self, step: usize) -> RwLockReadGuard<'_, Shelf> {
         self.shelves[step].read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What threads are solving at an instant.
+    pub(super) fn claims(&self, step: usize) -> &Claims {
+        &self.claims[step]
+    }
+
+    /// Entries held at all instants.
+    pub(super) fn entries(&self) -> usize {
+        self.entries.load(Ordering::Relaxed)
     }
 
     /// Counts the lookups of a chunk.
@@ -129,155 +132,5 @@ impl Transitions {
             self.entries.fetch_add(1, Ordering::Relaxed);
         }
         kept
-    }
-}
-
-/// What the entries of one instant have in common, and how many were solved.
-struct Instant {
-    problem: Problem,
-    free: FreeRows,
-    step: usize,
-    solved: u64,
-}
-
-/// A topology that is wanted, its model, and the order that leads there.
-struct Wanted<'a> {
-    topology: &'a Topology,
-    model: Topology,
-    order: Vec<usize>,
-}
-
-/// What a thread needs to solve entries.
-#[derive(Debug, Default)]
-pub(crate) struct Filler {
-    solver: Synthesizer,
-    closed_loop: Vec<f64>,
-    square: Vec<f64>,
-    row: Vec<f64>,
-    padded: Vec<f64>,
-}
-
-impl Policy {
-    /// Makes the entries of `missing` at an instant available: in the table, or in `local` where the budget is used up.
-    /// Says how many this thread solved.
-    pub(crate) fn fill(
-        &self,
-        step: usize,
-        missing: &[Topology],
-        local: &mut Shelf,
-        filler: &mut Filler,
-        cancel: &CancelToken,
-    ) -> Result<u64, Cancelled> {
-        let claims = &self.transitions.claims[step];
-        let wanted: Vec<Wanted> = missing
-            .iter()
-            .map(|topology| {
-                let (model, order) = self.kinds.model(topology);
-                Wanted { topology, model, order }
-            })
-            .collect();
-        let mut unknown: Vec<&Wanted> =
-            wanted.iter().filter(|wanted| !self.supply(step, wanted, local, &mut filler.padded)).collect();
-        // Those with many unknowns first: the quick ones fill the lanes to the end.
-        unknown.sort_by(|a, b| (b.model.edges(), &b.model).cmp(&(a.model.edges(), &a.model)));
-        unknown.dedup_by(|a, b| a.model == b.model);
-        let group = if self.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
-        let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
-        let mut instant = Instant { problem: self.problem(step), free: self.free_rows(step), step, solved: 0 };
-        for group in unknown.chunks(group) {
-            cancel.check()?;
-            let claimed: Vec<(Claim, &Wanted)> =
-                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.model)?, *wanted))).collect();
-            let mut mine: Vec<&Wanted> = claimed.iter().map(|&(_, wanted)| wanted).collect();
-            mine.retain(|wanted| !self.supply(step, wanted, local, &mut filler.padded));
-            self.solve_group(&mut instant, &mine, local, filler);
-        }
-        for wanted in &unknown {
-            claims.wait(&wanted.model, cancel)?;
-        }
-        for wanted in &wanted {
-            // Past the budget, or left by a thread that was cancelled.
-            if !self.supply(step, wanted, local, &mut filler.padded) {
-                self.solve_group(&mut instant, &[wanted], local, filler);
-            }
-        }
-        Ok(instant.solved)
-    }
-
-    /// Makes an entry available that is there already, under its own name or another; says whether it is.
-    fn supply(&self, step: usize, wanted: &Wanted, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
-        let shelf = self.transitions.shelf(step);
-        let words = wanted.topology.words();
-        if shelf.find(words) != 0 || local.find(words) != 0 {
-            return true;
-        }
-        let model = wanted.model.words();
-        let (held, slot) = match (shelf.find_model(model), local.find_model(model)) {
-            (0, 0) => return false,
-            (0, slot) => (&*local, slot as usize),
-            (slot, _) => (&*shelf, slot as usize),
-        };
-        let other = Topology::from_words(self.game.constrained(), self.game.size(), held.key(slot));
-        let (from, rows) = (held.matrix(slot), padded(self.game.size()));
-        let of = self.kinds.model(&other).1;
-        matrix.clear();
-        matrix.resize(from.len(), 0.0);
-        for (&j, &other_j) in wanted.order.iter().zip(&of) {
-            for (&i, &other_i) in wanted.order.iter().zip(&of) {
-                matrix[j * rows + i] = from[other_j * rows + other_i];
-            }
-        }
-        drop(shelf);
-        self.store(step, wanted.topology, &wanted.model, local, matrix);
-        true
-    }
-
-    /// Stores an entry in the table or, where the budget is used up, in `local`.
-    fn store(&self, step: usize, topology: &Topology, model: &Topology, local: &mut Shelf, matrix: &[f64]) {
-        let model = self.kinds.some().then_some(model.words());
-        if !self.transitions.keep(step, topology.words(), model, matrix, &self.budget) {
-            local.insert(topology.words(), model, matrix);
-        }
-    }
-
-    /// Solves entries of one instant together and stores them.
-    fn solve_group(&self, instant: &mut Instant, wanted: &[&Wanted], local: &mut Shelf, filler: &mut Filler) {
-        let (n, step) = (self.game.size(), instant.step);
-        instant.solved += wanted.len() as u64;
-        let mut unknown = Vec::new();
-        for &wanted in wanted {
-            match self.table.peek(step, wanted.topology) {
-                Some(known) => {
-                    let none: Vec<usize> = (0..n).collect();
-                    pad(&known.transition, &none, &mut filler.padded);
-                    self.store(step, wanted.topology, &wanted.model, local, &filler.padded);
-                }
-                None => unknown.push(wanted),
-            }
-        }
-        filler.square.resize(n * n, 0.0);
-        filler.closed_loop.resize(n * n, 0.0);
-        filler.row.resize(n, 0.0);
-        let Filler { solver, closed_loop, square, row, padded } = filler;
-        let models: Vec<Topology> = unknown.iter().map(|wanted| wanted.model.clone()).collect();
-        solver.solve_all(&instant.problem, &models, crate::synthesis::Options::default(), |index, gains| {
-            super::closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
-            super::exponential::exponential(closed_loop, &instant.free.attacker, self.game.grid().step(), square, row);
-            let Wanted { topology, model, order } = unknown[index];
-            pad(square, order, padded);
-            self.store(step, topology, model, local, padded);
-        });
-    }
-}
-
-/// A row-major matrix of a relabelled game by columns under their own names, each padded with zeros.
-fn pad(matrix: &[f64], order: &[usize], out: &mut Vec<f64>) {
-    let (n, rows) = (order.len(), padded(order.len()));
-    out.clear();
-    out.resize(n * rows, 0.0);
-    for (row, &i) in matrix.chunks_exact(n).zip(order) {
-        for (&x, &j) in row.iter().zip(order) {
-            out[j * rows + i] = x;
-        }
     }
 }

@@ -1,0 +1,171 @@
+//! Solves the table entries that an ensemble misses at an instant, each once, however many threads ask for it.
+
+use super::Policy;
+use super::closed_loop::{self, FreeRows};
+use super::exponential;
+use super::step_table::{Shelf, padded};
+use super::transitions::Claim;
+use crate::cancel::CancelToken;
+use crate::error::Cancelled;
+use crate::network::Topology;
+use crate::synthesis::{Options, Problem, SIDE_BY_SIDE_UP_TO, Synthesizer};
+
+/// Entries that a thread claims and solves at once, side by side: enough to keep eight lanes full, and few enough for
+/// other threads to have their share and for a cancellation to be noticed soon.
+const GROUP: usize = 64;
+
+/// What the entries of one instant have in common, and how many were solved.
+struct Instant<'a> {
+    policy: &'a Policy,
+    problem: Problem,
+    free: FreeRows,
+    step: usize,
+    solved: u64,
+}
+
+/// A topology that is wanted, its model, and the order that leads there.
+struct Wanted<'a> {
+    topology: &'a Topology,
+    model: Topology,
+    order: Vec<usize>,
+}
+
+/// What a thread needs to solve entries: its solver and scratch memory.
+#[derive(Debug, Default)]
+pub(crate) struct Filler {
+    solver: Synthesizer,
+    closed_loop: Vec<f64>,
+    square: Vec<f64>,
+    row: Vec<f64>,
+    padded: Vec<f64>,
+}
+
+impl Filler {
+    /// Makes the entries of `missing` at an instant available: in the table, or in `local` where the budget is used up.
+    /// Says how many this thread solved.
+    pub(crate) fn fill(
+        &mut self,
+        policy: &Policy,
+        step: usize,
+        missing: &[Topology],
+        local: &mut Shelf,
+        cancel: &CancelToken,
+    ) -> Result<u64, Cancelled> {
+        let claims = policy.transitions.claims(step);
+        let (problem, free) = (policy.problem(step), policy.free_rows(step));
+        let mut instant = Instant { policy, problem, free, step, solved: 0 };
+        let wanted: Vec<Wanted> = missing
+            .iter()
+            .map(|topology| {
+                let (model, order) = policy.kinds.model(topology);
+                Wanted { topology, model, order }
+            })
+            .collect();
+        let mut unknown: Vec<&Wanted> =
+            wanted.iter().filter(|wanted| !instant.supply(wanted, local, &mut self.padded)).collect();
+        // Those with many unknowns first: the quick ones fill the lanes to the end.
+        unknown.sort_by(|a, b| (b.model.edges(), &b.model).cmp(&(a.model.edges(), &a.model)));
+        unknown.dedup_by(|a, b| a.model == b.model);
+        let group = if policy.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
+        let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
+        for group in unknown.chunks(group) {
+            cancel.check()?;
+            let claimed: Vec<(Claim, &Wanted)> =
+                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.model)?, *wanted))).collect();
+            let mut mine: Vec<&Wanted> = claimed.iter().map(|&(_, wanted)| wanted).collect();
+            mine.retain(|wanted| !instant.supply(wanted, local, &mut self.padded));
+            self.solve(&mut instant, &mine, local);
+        }
+        for wanted in &unknown {
+            claims.wait(&wanted.model, cancel)?;
+        }
+        for wanted in &wanted {
+            // Past the budget, or left by a thread that was cancelled.
+            if !instant.supply(wanted, local, &mut self.padded) {
+                self.solve(&mut instant, &[wanted], local);
+            }
+        }
+        Ok(instant.solved)
+    }
+
+    /// Solves entries of one instant together and stores them.
+    fn solve(&mut self, instant: &mut Instant, wanted: &[&Wanted], local: &mut Shelf) {
+        instant.solved += wanted.len() as u64;
+        let instant = &*instant;
+        let (policy, n) = (instant.policy, instant.policy.game.size());
+        let mut unknown = Vec::new();
+        for &wanted in wanted {
+            match policy.table.peek(instant.step, wanted.topology) {
+                Some(known) => {
+                    let none: Vec<usize> = (0..n).collect();
+                    pad(&known.transition, &none, &mut self.padded);
+                    instant.store(wanted, local, &self.padded);
+                }
+                None => unknown.push(wanted),
+            }
+        }
+        self.square.resize(n * n, 0.0);
+        self.closed_loop.resize(n * n, 0.0);
+        self.row.resize(n, 0.0);
+        let Self { solver, closed_loop, square, row, padded } = self;
+        let models: Vec<Topology> = unknown.iter().map(|wanted| wanted.model.clone()).collect();
+        solver.solve_all(&instant.problem, &models, Options::default(), |index, gains| {
+            closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
+            exponential::exponential(closed_loop, &instant.free.attacker, policy.game.grid().step(), square, row);
+            pad(square, &unknown[index].order, padded);
+            instant.store(unknown[index], local, padded);
+        });
+    }
+}
+
+impl Instant<'_> {
+    /// Makes an entry available that is there already, under its own name or another; says whether it is.
+    fn supply(&self, wanted: &Wanted, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
+        let game = &self.policy.game;
+        let shelf = self.policy.transitions.shelf(self.step);
+        let words = wanted.topology.words();
+        if shelf.find(words) != 0 || local.find(words) != 0 {
+            return true;
+        }
+        let model = wanted.model.words();
+        let (held, slot) = match (shelf.find_model(model), local.find_model(model)) {
+            (0, 0) => return false,
+            (0, slot) => (&*local, slot as usize),
+            (slot, _) => (&*shelf, slot as usize),
+        };
+        let other = Topology::from_words(game.constrained(), game.size(), held.key(slot));
+        let (from, rows) = (held.matrix(slot), padded(game.size()));
+        let of = self.policy.kinds.model(&other).1;
+        matrix.clear();
+        matrix.resize(from.len(), 0.0);
+        for (&j, &other_j) in wanted.order.iter().zip(&of) {
+            for (&i, &other_i) in wanted.order.iter().zip(&of) {
+                matrix[j * rows + i] = from[other_j * rows + other_i];
+            }
+        }
+        drop(shelf);
+        self.store(wanted, local, matrix);
+        true
+    }
+
+    /// Stores an entry in the table or, where the budget is used up, in `local`.
+    fn store(&self, wanted: &Wanted, local: &mut Shelf, matrix: &[f64]) {
+        let words = wanted.topology.words();
+        let model = self.policy.kinds.some().then_some(wanted.model.words());
+        if !self.policy.transitions.keep(self.step, words, model, matrix, &self.policy.budget) {
+            local.insert(words, model, matrix);
+        }
+    }
+}
+
+/// A row-major matrix of a relabelled game by columns under their own names, each padded with zeros.
+fn pad(matrix: &[f64], order: &[usize], out: &mut Vec<f64>) {
+    let (n, rows) = (order.len(), padded(order.len()));
+    out.clear();
+    out.resize(n * rows, 0.0);
+    for (row, &i) in matrix.chunks_exact(n).zip(order) {
+        for (&x, &j) in row.iter().zip(order) {
+            out[j * rows + i] = x;
+        }
+    }
+}
