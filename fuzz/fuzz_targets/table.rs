@@ -41,7 +41,7 @@ fn play(policy: &Policy, n: usize) -> Vec<u8> {
     policy.save_transitions()
 }
 
-/// A shelf by index, one by hashing and one of keys of two words.
+/// A per-step table by index, one by hashing and one of keys of two words.
 static KNOWN: LazyLock<Vec<Known>> = LazyLock::new(|| {
     [(Interaction::I1, 2), (Interaction::I1, 3), (Interaction::I2, 3), (Interaction::I1, 8)]
         .into_iter()
@@ -56,10 +56,7 @@ static KNOWN: LazyLock<Vec<Known>> = LazyLock::new(|| {
 /// The checksum of the format, so that what is changed on purpose is not refused as an accident.
 fn sealed(mut table: Vec<u8>) -> Vec<u8> {
     let end = table.len() - 8;
-    let (words, _) = table[..end].as_chunks::<8>();
-    let sum = words.iter().fold(0xCBF2_9CE4_8422_2325_u64, |hash, word| {
-        (hash ^ u64::from_le_bytes(*word)).wrapping_mul(0x0000_0100_0000_01B3).rotate_left(23)
-    });
+    let sum = u64::from(crc32fast::hash(&table[..end]));
     table[end..].copy_from_slice(&sum.to_le_bytes());
     table
 }

@@ -176,7 +176,9 @@ fn sorted(policy: &Policy) -> Vec<Vec<u8>> {
     let bytes = policy.save_transitions();
     let words = (policy.game().constrained() * policy.game().size()).div_ceil(64);
     let len = 8 * (1 + words + policy.game().size().pow(2));
-    let mut entries: Vec<Vec<u8>> = bytes[40..bytes.len() - 8].chunks_exact(len).map(<[u8]>::to_vec).collect();
+    // Behind the header and the game's identity, of which the header says how long it is.
+    let first = 40 + u64::from_le_bytes(bytes[24..32].try_into().expect("eight bytes")) as usize;
+    let mut entries: Vec<Vec<u8>> = bytes[first..bytes.len() - 8].chunks_exact(len).map(<[u8]>::to_vec).collect();
     entries.sort();
     entries
 }
@@ -254,6 +256,9 @@ fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
             assert_eq!(load(&damaged), Err(TableError::Damaged), "byte {at}");
         }
         assert_eq!(load(&bytes[..bytes.len() - 8]), Err(TableError::Damaged));
+        let mut former = bytes.clone();
+        former[8] = 1;
+        assert_eq!(load(&former), Err(TableError::Format { found: 1, expected: 2 }));
     }
 }
 

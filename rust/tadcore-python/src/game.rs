@@ -58,6 +58,8 @@ impl Game {
         target_running_weight=1.0, target_terminal_weight=1.0, attacker_target_running_weight=1.0,
         attacker_target_terminal_weight=1.0, evasion_running_weight, evasion_terminal_weight, evasion=1.0,
         synthesis_weights, table_bytes=None))]
+    // A keyword for each weight, as the scenario names them.
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         interaction: &str,

@@ -1,9 +1,9 @@
 //! A table of transitions as bytes: saved beside a study, read back before the next one, which then starts warm.
 //!
-//! Little-endian: the magic, the format, N, m, K (u32 each, after eight bytes of magic), the game's fingerprint and the
-//! number of entries (u64), then the entries: step (u64), key (words of u64), exp(Cδ) by columns (N² f64). The last
-//! eight bytes are a checksum of all before. The fingerprint covers every weight, the grid and the version of this
-//! crate, since another version may choose other gains.
+//! Little-endian: the magic (8 bytes), the format, N, m, K (u32 each), the length of the game's identity in bytes and the
+//! number of entries (u64 each), the identity, then the entries: step (u64), key (words of u64), exp(Cδ) by columns
+//! (N² f64). The last eight bytes hold the CRC-32 of all before. The identity is every weight, the grid and the version
+//! of this crate, since another version may choose other gains.
 
 use super::step_table::padded;
 use super::transitions::Transitions;
@@ -11,31 +11,25 @@ use crate::error::TableError;
 use crate::game::{Game, Interaction};
 
 const MAGIC: &[u8; 8] = b"tadtable";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 * 4 + 2 * 8;
-/// Start value and factor of the checksum (FNV-1a, over words).
-const FNV: (u64, u64) = (0xCBF2_9CE4_8422_2325, 0x0000_0100_0000_01B3);
-
-fn mix(hash: u64, word: u64) -> u64 {
-    // The rotation lets the high bits of a word reach the low bits of the sum.
-    (hash ^ word).wrapping_mul(FNV.1).rotate_left(23)
-}
 
 fn checksum(bytes: &[u8]) -> u64 {
-    let (words, _) = bytes.as_chunks::<8>();
-    words.iter().fold(FNV.0, |hash, word| mix(hash, u64::from_le_bytes(*word)))
+    crc32fast::hash(bytes).into()
 }
 
-/// A number that two games share only if every answer of their policies is the same.
-fn fingerprint(game: &Game) -> u64 {
+/// What two games share only if every answer of their policies is the same.
+fn identity(game: &Game) -> Vec<u8> {
     let w = game.weights();
     let lists = [&w.r_d, &w.q_da, &w.f_da, &w.q_ad, &w.f_ad, &w.gamma];
     let single = [w.r_tau, w.r_a, w.q_atau, w.f_atau, w.q_taua, w.f_taua, w.lambda, game.grid().horizon()];
     let numbers = lists.into_iter().flatten().chain(&single).map(|x| x.to_bits());
     let interaction = u64::from(game.interaction() == Interaction::I1);
     let sizes = [interaction, game.n() as u64, game.grid().steps() as u64];
-    let version = env!("CARGO_PKG_VERSION").bytes().map(u64::from);
-    version.chain(sizes).chain(numbers).fold(FNV.0, mix)
+    let mut out: Vec<u8> = sizes.into_iter().chain(numbers).flat_map(u64::to_le_bytes).collect();
+    out.extend_from_slice(env!("CARGO_PKG_VERSION").as_bytes());
+    out.resize(out.len().next_multiple_of(8), 0);
+    out
 }
 
 /// Reads numbers from the front of a slice that was measured before.
@@ -60,7 +54,7 @@ struct Shape {
     words: usize,
     /// Bytes of an entry.
     entry: usize,
-    fingerprint: u64,
+    identity: Vec<u8>,
 }
 
 impl Shape {
@@ -68,7 +62,7 @@ impl Shape {
         let (size, constrained) = (game.size(), game.constrained());
         let words = (constrained * size).div_ceil(64);
         let (entry, steps) = (8 * (1 + words + size * size), game.grid().steps());
-        Self { size, constrained, steps, words, entry, fingerprint: fingerprint(game) }
+        Self { size, constrained, steps, words, entry, identity: identity(game) }
     }
 
     /// The numbers that follow the format.
@@ -97,9 +91,10 @@ pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
     for number in std::iter::once(FORMAT).chain(shape.numbers()) {
         out.extend_from_slice(&number.to_le_bytes());
     }
-    out.extend_from_slice(&shape.fingerprint.to_le_bytes());
+    out.extend_from_slice(&(shape.identity.len() as u64).to_le_bytes());
     let count_at = out.len();
     out.extend_from_slice(&[0; 8]);
+    out.extend_from_slice(&shape.identity);
     let mut count = 0u64;
     for step in 0..shape.steps {
         let shelf = transitions.shelf(step);
@@ -133,14 +128,16 @@ pub(super) fn read(bytes: &[u8], game: &Game, mut each: impl FnMut(usize, &[u64]
         return Err(TableError::Format { found: format, expected: FORMAT });
     }
     let numbers = [reader.u32(), reader.u32(), reader.u32()];
-    let (print, count) = (reader.u64(), reader.u64());
-    if numbers != shape.numbers() || print != shape.fingerprint {
-        return Err(TableError::OtherGame);
-    }
+    let (identity, count) = (reader.u64(), reader.u64());
     let (data, sum) = bytes.split_at(bytes.len() - 8);
-    let body = &data[HEADER..];
-    let whole = count.checked_mul(shape.entry as u64) == Some(body.len() as u64);
-    if !whole || Reader(sum).u64() != checksum(data) {
+    if Reader(sum).u64() != checksum(data) {
+        return Err(TableError::Damaged);
+    }
+    let other = numbers != shape.numbers() || identity != shape.identity.len() as u64;
+    let Some(body) = data[HEADER..].strip_prefix(&shape.identity[..]).filter(|_| !other) else {
+        return Err(TableError::OtherGame);
+    };
+    if count.checked_mul(shape.entry as u64) != Some(body.len() as u64) {
         return Err(TableError::Damaged);
     }
     let entries = body.chunks_exact(shape.entry);

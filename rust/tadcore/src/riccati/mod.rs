@@ -148,12 +148,6 @@ impl Equilibrium {
         &self.nodes
     }
 
-    /// The whole storage without a copy, (k, group, i, j).
-    #[must_use]
-    pub fn into_vec(self) -> Vec<f64> {
-        self.nodes
-    }
-
     /// Writes the rows g of the equilibrium controls u = g z at t_k into `out`, (N + 1) × N: d₁…d_n, target, attacker.
     ///
     /// I1 (eq:1d): −P_d[i, :]/r_{d_i}, −P_τ[N, :]/r_τ and 1ᵀP_a/r_a. I2 (eq:zero_sum_control2, eq:zero_sum_control1):

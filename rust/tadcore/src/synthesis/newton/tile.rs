@@ -9,7 +9,7 @@ pub(super) type Tile<T> = [[T; GROUP]; GROUP];
 /// Factorises a tile of the diagonal, from which the columns before are taken off, and writes its part of the factor. The
 /// tile is left with C, and 1/D is the answer.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments, reason = "inlined into loops that hold these in registers")]
 pub(super) fn diagonal<T: Number>(
     on: &mut Tile<T>,
     first: usize,
