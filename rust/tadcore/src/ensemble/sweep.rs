@@ -11,7 +11,7 @@ use super::anysize::sweep_any;
 use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
 use crate::policy::index::DIRECT_BITS;
 use crate::policy::step_table::Shelf;
-use crate::simd::{Number, Simd, dispatch};
+use crate::simd::{Number, Simd, Width, dispatch};
 
 /// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
 /// cache in between.
@@ -218,14 +218,19 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
 dispatch! {
     /// A sweep compiled for its sizes.
     fn sized<V, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
-        _shape: &Shape,
+        shape: &Shape,
         strips: &mut Strips,
         from: usize,
         shelf: &Shelf,
         next: Option<&Shelf>,
         keys: &mut Keys,
     ) -> Stop {
-        sweep::<V, N, M, D, Q, E>(strips, from, shelf, next, keys)
+        if const { V::SIZED } {
+            sweep::<V, N, M, D, Q, E>(strips, from, shelf, next, keys)
+        } else {
+            // Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+            sweep_any(Width::Baseline, shape, strips, from, shelf, next, keys)
+        }
     }
 }
 

@@ -142,25 +142,6 @@ impl Synthesizer {
         problem: &Problem,
         topologies: &[Topology],
         options: Options,
-        each: impl FnMut(usize, Gains),
-    ) {
-        match problem.size {
-            2 => self.solve_sized::<2>(problem, topologies, options, each),
-            3 => self.solve_sized::<3>(problem, topologies, options, each),
-            4 => self.solve_sized::<4>(problem, topologies, options, each),
-            5 => self.solve_sized::<5>(problem, topologies, options, each),
-            6 => self.solve_sized::<6>(problem, topologies, options, each),
-            7 => self.solve_sized::<7>(problem, topologies, options, each),
-            8 => self.solve_sized::<8>(problem, topologies, options, each),
-            _ => self.solve_sized::<0>(problem, topologies, options, each),
-        }
-    }
-
-    fn solve_sized<const N: usize>(
-        &mut self,
-        problem: &Problem,
-        topologies: &[Topology],
-        options: Options,
         mut each: impl FnMut(usize, Gains),
     ) {
         let limits = Limits {
@@ -180,7 +161,7 @@ impl Synthesizer {
         let Self { engine, tasks, doubled } = self;
         let mut search = Search { problem, limits, engine, tasks, doubled };
         match options.method {
-            Method::Newton => search.run::<N>(&mut entries),
+            Method::Newton => search.run(&mut entries),
             Method::Descent => {
                 for (entry, topology) in entries.iter_mut().zip(topologies) {
                     let variables = search::paper_variables(topology);
@@ -188,7 +169,7 @@ impl Synthesizer {
                     entry.iterations = entry.reached.iterations;
                 }
                 let all: Vec<usize> = (0..entries.len()).collect();
-                search.certify::<N>(&mut entries, &all);
+                search.certify(&mut entries, &all);
             }
         }
         for (index, entry) in entries.into_iter().enumerate() {

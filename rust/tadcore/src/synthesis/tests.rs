@@ -104,9 +104,9 @@ pub(super) fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) 
 fn derivatives_match_differences() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, _, g) = sample(interaction);
-        check(&mut RealGains::<f64, 0>::new(&problem.double), &g[..g.len() / 2]);
+        check(&mut RealGains::<f64, 0>::new(&problem.theta.double), &g[..g.len() / 2]);
         for complex in [true, false] {
-            let mut doubled = Doubled::<f64, 0>::new(&problem.double);
+            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double);
             doubled.set_lane(0, complex, 1.0);
             check(&mut doubled, &g);
         }
@@ -146,7 +146,7 @@ fn the_value_is_the_weighted_sum_of_the_terms() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, p, g) = sample(interaction);
         let g = &g[..g.len() / 2];
-        let value = RealGains::<f64, 0>::new(&problem.double).value(g);
+        let value = RealGains::<f64, 0>::new(&problem.theta.double).value(g);
         let sum = problem.weigh(&problem.terms(&p, g));
         assert!((sum - value).abs() < 1e-12 * value);
     }
@@ -178,20 +178,20 @@ fn by_definition(problem: &Problem, g: &[f64], complex: bool) -> f64 {
     let mut sum = 0.0;
     for p in 0..n {
         for q in 0..n {
-            let mut x = (-problem.double.target[p * n + q], 0.0);
+            let mut x = (-problem.theta.double.target[p * n + q], 0.0);
             for i in 0..m {
                 let (gp, gq) = ((a[i * n + p], b[i * n + p]), (a[i * n + q], b[i * n + q]));
                 let term = product((gp.0, -gp.1), gq);
                 x = (
-                    x.0 + problem.double.r[i] * term.0,
-                    x.1 + problem.double.r[i] * if complex { term.1 } else { 0.0 },
+                    x.0 + problem.theta.double.r[i] * term.0,
+                    x.1 + problem.theta.double.r[i] * if complex { term.1 } else { 0.0 },
                 );
             }
             sum += problem.gamma[0] * square(x);
         }
     }
-    let delta = |i: usize, q: usize| (a[i * n + q] - problem.double.fne[i * n + q], b[i * n + q]);
-    for w in &problem.double.coupling {
+    let delta = |i: usize, q: usize| (a[i * n + q] - problem.theta.double.fne[i * n + q], b[i * n + q]);
+    for w in &problem.theta.double.coupling {
         for p in 0..n {
             for q in 0..n {
                 let (mut e, mut turned) = ((0.0, 0.0), (0.0, 0.0));
@@ -207,7 +207,7 @@ fn by_definition(problem: &Problem, g: &[f64], complex: bool) -> f64 {
     }
     for i in 0..m {
         for q in 0..n {
-            sum += problem.double.closeness[i] * square(delta(i, q));
+            sum += problem.theta.double.closeness[i] * square(delta(i, q));
         }
     }
     sum
@@ -218,13 +218,13 @@ fn doubled_gains_are_complex_or_stacked() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, _, g) = sample(interaction);
         for complex in [true, false] {
-            let mut doubled = Doubled::<f64, 0>::new(&problem.double);
+            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double);
             doubled.set_lane(0, complex, 1.0);
             let (value, expected) = (doubled.value(&g), by_definition(&problem, &g, complex));
             assert!((value - expected).abs() < 1e-12 * expected, "{interaction:?} {complex}: {value} {expected}");
             let mut flat = g.clone();
             flat[g.len() / 2..].fill(0.0);
-            let real = RealGains::<f64, 0>::new(&problem.double).value(&flat[..g.len() / 2]);
+            let real = RealGains::<f64, 0>::new(&problem.theta.double).value(&flat[..g.len() / 2]);
             assert!((doubled.value(&flat) - real).abs() < 1e-12 * real, "{interaction:?} {complex}");
         }
     }
@@ -239,10 +239,10 @@ fn sizes_bound_the_parts_that_cancel() {
         for term in 0..interaction.terms() {
             let mut gamma = vec![0.0; interaction.terms()];
             gamma[term] = 0.7;
-            let problem = Problem::from_parts(interaction, sampled.double.r.clone(), gamma, &p);
-            let mut objective = RealGains::<f64, 0>::new(&problem.double);
+            let problem = Problem::from_parts(interaction, sampled.theta.double.r.clone(), gamma, &p);
+            let mut objective = RealGains::<f64, 0>::new(&problem.theta.double);
             let zero = objective.value(&vec![0.0; m * n]);
-            assert!(zero <= problem.double.scale.value * (1.0 + 1e-14), "{interaction:?} {term}");
+            assert!(zero <= problem.theta.double.scale.value * (1.0 + 1e-14), "{interaction:?} {term}");
             for size in [1e-3, 1.0, 1e3] {
                 let g: Vec<f64> = points[..m * n].iter().map(|x| size * x).collect();
                 objective.value(&g);
@@ -251,8 +251,8 @@ fn sizes_bound_the_parts_that_cancel() {
                 let rgm: f64 = (0..m * n)
                     .map(|e| {
                         let (i, b) = (e / n, e % n);
-                        let row: f64 = (0..n).map(|a| g[i * n + a] * problem.double.target[a * n + b]).sum();
-                        (4.0 * problem.gamma[0] * problem.double.r[i] * row).powi(2)
+                        let row: f64 = (0..n).map(|a| g[i * n + a] * problem.theta.double.target[a * n + b]).sum();
+                        (4.0 * problem.gamma[0] * problem.theta.double.r[i] * row).powi(2)
                     })
                     .sum();
                 assert!(rgm.sqrt() <= scale, "{interaction:?} {term} {size}");

@@ -6,9 +6,9 @@
 
 use std::any::Any;
 
-use crate::simd::{Number, Simd, Width, dispatch, widened};
+use crate::simd::{Number, Width, dispatch, widened};
 use crate::synthesis::newton::{Limits, Means, Objective, Owner, Tasks, Workspace, factorise, minimise};
-use crate::synthesis::theta::{Certificate, Doubled, Parts, Problem, RealGains};
+use crate::synthesis::theta::{Certificate, Doubled, Parts, Precisions, RealGains};
 
 /// N up to which there is a version with constant loop bounds.
 pub(crate) const CONSTANT_UP_TO: usize = 8;
@@ -75,19 +75,41 @@ impl Engine {
     }
 
     /// Makes the descents of `tasks`.
-    pub(crate) fn run<const N: usize>(
+    pub(crate) fn run(
         &mut self,
         kind: Kind,
-        problem: &Problem,
+        problem: &Precisions,
         tasks: &mut Tasks,
         owners: &[Owner],
         limits: Limits,
     ) {
-        let means = Means { library: problem.size > CONSTANT_UP_TO, width: self.width };
+        match problem.double.size {
+            2 => self.run_sized::<2>(kind, problem, tasks, owners, limits),
+            3 => self.run_sized::<3>(kind, problem, tasks, owners, limits),
+            4 => self.run_sized::<4>(kind, problem, tasks, owners, limits),
+            5 => self.run_sized::<5>(kind, problem, tasks, owners, limits),
+            6 => self.run_sized::<6>(kind, problem, tasks, owners, limits),
+            7 => self.run_sized::<7>(kind, problem, tasks, owners, limits),
+            8 => self.run_sized::<8>(kind, problem, tasks, owners, limits),
+            _ => self.run_sized::<0>(kind, problem, tasks, owners, limits),
+        }
+    }
+
+    /// The same by the version for N, or by the one for any size where N is 0.
+    pub(crate) fn run_sized<const N: usize>(
+        &mut self,
+        kind: Kind,
+        problem: &Precisions,
+        tasks: &mut Tasks,
+        owners: &[Owner],
+        limits: Limits,
+    ) {
+        let means = Means { library: problem.double.size > CONSTANT_UP_TO, width: self.width };
         let mut list = List { kind, tasks, owners, limits, means };
         let (width, scratch) = (self.width, &mut self.scratch);
         let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
-        match (kind, single::<N>(problem)) {
+        let single = problem.single.as_ref().filter(|_| side_by_side(N));
+        match (kind, single) {
             (Kind::Scout | Kind::Doubled, Some(parts)) => {
                 if const { side_by_side(N) } && several {
                     return several_single::<N>(width, parts, &mut list, scratch);
@@ -113,9 +135,10 @@ const fn side_by_side(n: usize) -> bool {
     0 < n && n <= SIDE_BY_SIDE_UP_TO
 }
 
-/// The problem in single precision: where descents go side by side, twice as many fit a register.
-pub(crate) fn single<const N: usize>(problem: &Problem) -> Option<&Parts<f32>> {
-    problem.single.as_ref().filter(|_| side_by_side(N))
+/// Whether descents are made in single precision: where they go side by side, twice as many fit a register.
+#[must_use]
+pub(crate) fn single(problem: &Precisions) -> bool {
+    problem.single.is_some() && side_by_side(problem.double.size)
 }
 
 // Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.

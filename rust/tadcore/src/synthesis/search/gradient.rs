@@ -16,7 +16,7 @@ const HALVINGS: usize = 60;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
 pub(crate) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
-    let mut objective = RealGains::<f64, 0>::new(&problem.double);
+    let mut objective = RealGains::<f64, 0>::new(&problem.theta.double);
     let mut layout = Layout::default();
     layout.begin(g.len(), 1);
     layout.place(0, variables);

@@ -39,12 +39,12 @@ pub(crate) struct Search<'a> {
 
 impl Search<'_> {
     /// Finds the global minimum of Θ for every entry.
-    pub(crate) fn run<const N: usize>(&mut self, entries: &mut [Entry]) {
+    pub(crate) fn run(&mut self, entries: &mut [Entry]) {
         self.start(1);
         for (e, entry) in entries.iter().enumerate() {
             self.tasks.add(e, false, 0.0).copy_from_slice(&entry.start);
         }
-        self.descend::<N>(Kind::Certified, entries);
+        self.descend(Kind::Certified, entries);
         for (task, entry) in entries.iter_mut().enumerate() {
             let reached = self.tasks.reached(task);
             entry.take(Look::Canonical, self.tasks.point(task), reached);
@@ -54,15 +54,15 @@ impl Search<'_> {
         }
         let open: Vec<usize> = (0..entries.len()).filter(|&e| !entries[e].certified).collect();
         if !open.is_empty() {
-            self.look_further::<N>(entries, &open);
+            self.look_further(entries, &open);
         }
-        self.polish::<N>(entries);
+        self.polish(entries);
     }
 
     /// Everything beyond the first descent, for the entries `open`.
-    fn look_further<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) {
-        let looks = self.double::<N>(entries, open);
-        self.finish::<N>(entries, looks);
+    fn look_further(&mut self, entries: &mut [Entry], open: &[usize]) {
+        let looks = self.double(entries, open);
+        self.finish(entries, looks);
         let mut lower = open.to_vec();
         for _ in 0..ROUNDS {
             self.start(1);
@@ -70,19 +70,19 @@ impl Search<'_> {
                 self.reverse(e, &entries[e].g);
             }
             let looks = vec![Look::Reversed; self.tasks.len()];
-            lower = self.finish::<N>(entries, looks);
+            lower = self.finish(entries, looks);
             if lower.is_empty() {
                 break;
             }
         }
         // Where a later look won there is another point to be tried for the certificate.
         let won: Vec<usize> = open.iter().copied().filter(|&e| entries[e].look != Look::Canonical).collect();
-        self.certify::<N>(entries, &won);
+        self.certify(entries, &won);
     }
 
     /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
     /// long as the gradient falls.
-    fn polish<const N: usize>(&mut self, entries: &mut [Entry]) {
+    fn polish(&mut self, entries: &mut [Entry]) {
         self.start(1);
         for (e, entry) in entries.iter().enumerate().filter(|(_, entry)| !entry.quick) {
             self.tasks.add(e, false, 0.0).copy_from_slice(&entry.g);
@@ -92,7 +92,7 @@ impl Search<'_> {
         }
         let limits = self.limits;
         self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
-        self.descend::<N>(Kind::Real, entries);
+        self.descend(Kind::Real, entries);
         self.limits = limits;
         for task in 0..self.tasks.len() {
             let (entry, reached) = (&mut entries[self.tasks.owner(task)], self.tasks.reached(task));
@@ -109,15 +109,15 @@ impl Search<'_> {
     }
 
     /// Makes the listed descents, without rivals.
-    fn descend<const N: usize>(&mut self, kind: Kind, entries: &[Entry]) {
+    fn descend(&mut self, kind: Kind, entries: &[Entry]) {
         let owners: Vec<Owner> = entries.iter().map(|e| Owner { variables: &e.variables, rival: None }).collect();
-        self.engine.run::<N>(kind, self.problem, self.tasks, &owners, self.limits);
+        self.engine.run(kind, &self.problem.theta, self.tasks, &owners, self.limits);
     }
 
     /// Descends in doubled gains, and lists the starts that come of it and those without one row: the look of each.
-    fn double<const N: usize>(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
+    fn double(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
         let (n, m) = (self.problem.size, self.problem.rows);
-        let scale = self.problem.double.scale.fne;
+        let scale = self.problem.theta.double.scale.fne;
         self.start(2);
         for &e in open {
             for complex in [true, false] {
@@ -128,7 +128,7 @@ impl Search<'_> {
             &mut self.limits,
             Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale },
         );
-        self.descend::<N>(Kind::Doubled, entries);
+        self.descend(Kind::Doubled, entries);
         self.limits = limits;
 
         let doubled = std::mem::replace(self.tasks, std::mem::take(self.doubled));
@@ -161,7 +161,7 @@ impl Search<'_> {
 
     /// Drops the listed descents of which single precision already shows that they cannot get below the best point; the
     /// rest goes on from where it got.
-    fn scout<const N: usize>(&mut self, entries: &mut [Entry], looks: &mut Vec<Look>) {
+    fn scout(&mut self, entries: &mut [Entry], looks: &mut Vec<Look>) {
         let (width, tasks, scouts) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
         scouts.clear(width, 1);
         for task in (0..tasks.len()).filter(|&task| entries[tasks.owner(task)].quick) {
@@ -169,7 +169,7 @@ impl Search<'_> {
         }
         let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
         let limits = Limits { iterations: SCOUT_ITERATIONS, tolerance: FLAT, acceptable: FLAT, ..self.limits };
-        self.engine.run::<N>(Kind::Scout, self.problem, scouts, &owners, limits);
+        self.engine.run(Kind::Scout, &self.problem.theta, scouts, &owners, limits);
         let mut scout = 0..scouts.len();
         let keep: Vec<bool> = (0..tasks.len())
             .map(|task| {
@@ -190,12 +190,12 @@ impl Search<'_> {
     }
 
     /// Makes the listed descents and keeps what is lower; which entries that changed.
-    fn finish<const N: usize>(&mut self, entries: &mut [Entry], mut looks: Vec<Look>) -> Vec<usize> {
-        if dispatch::single::<N>(self.problem).is_some() {
-            self.scout::<N>(entries, &mut looks);
+    fn finish(&mut self, entries: &mut [Entry], mut looks: Vec<Look>) -> Vec<usize> {
+        if dispatch::single(&self.problem.theta) {
+            self.scout(entries, &mut looks);
         }
         let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
-        self.engine.run::<N>(Kind::Real, self.problem, self.tasks, &owners, self.limits);
+        self.engine.run(Kind::Real, &self.problem.theta, self.tasks, &owners, self.limits);
         let mut lower = Vec::new();
         for (task, look) in looks.into_iter().enumerate() {
             let e = self.tasks.owner(task);
@@ -221,7 +221,7 @@ impl Search<'_> {
     }
 
     /// Tries the certificate at the best point of each of `which`.
-    pub(crate) fn certify<const N: usize>(&mut self, entries: &mut [Entry], which: &[usize]) {
+    pub(crate) fn certify(&mut self, entries: &mut [Entry], which: &[usize]) {
         if which.is_empty() {
             return;
         }
@@ -231,7 +231,7 @@ impl Search<'_> {
         }
         let limits = self.limits;
         self.limits.iterations = 0;
-        self.descend::<N>(Kind::Certified, entries);
+        self.descend(Kind::Certified, entries);
         self.limits = limits;
         for task in 0..self.tasks.len() {
             entries[self.tasks.owner(task)].certified = self.tasks.certified(task);

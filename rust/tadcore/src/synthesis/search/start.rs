@@ -46,7 +46,7 @@ pub(crate) fn canonical(problem: &Problem, topology: &Topology, g: &mut [f64]) {
     for i in 0..problem.rows {
         let relative = !topology.sees_attacker(i);
         let used = |j: usize| j == i || topology.sees(i, j);
-        let row = &problem.double.fne[i * n..(i + 1) * n];
+        let row = &problem.theta.double.fne[i * n..(i + 1) * n];
         let (mut sum, mut count) = (0.0, 0.0);
         for j in (0..n).filter(|&j| used(j)) {
             sum += row[j];

@@ -120,7 +120,7 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
 fn a_descent_ends_early_only_where_it_cannot_win() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
     each(|problem, variables, g| {
-        let mut real = RealGains::<f64, 0>::new(&problem.double);
+        let mut real = RealGains::<f64, 0>::new(&problem.theta.double);
         let (end, alone) = descend(&mut real, g, variables, None, LIMITS);
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let mut beside = |value| {
@@ -149,7 +149,7 @@ fn a_descent_ends_early_only_where_it_cannot_win() {
 fn a_descent_ends_where_it_is_back() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
     each(|problem, variables, g| {
-        let mut real = RealGains::<f64, 0>::new(&problem.double);
+        let mut real = RealGains::<f64, 0>::new(&problem.theta.double);
         let (best, found) = descend(&mut real, g, variables, None, LIMITS);
         let near = 1e-3 * norm(&best);
         let mut off = best.clone();

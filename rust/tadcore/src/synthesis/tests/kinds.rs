@@ -14,17 +14,17 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
     let entry = Entry::new(variables(topology), start);
     let owners = [Owner { variables: &entry.variables, rival: None }];
     let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
-    let scale = problem.double.scale.fne;
+    let scale = problem.theta.double.scale.fne;
     tasks.clear(entry.start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(&entry.start);
-    engine.run::<0>(Kind::Real, problem, tasks, &owners, fine);
+    engine.run_sized::<0>(Kind::Real, &problem.theta, tasks, &owners, fine);
     let relative_to = tasks.reached(0).scale;
 
     tasks.clear(entry.start.len(), 2);
     far_start(&entry, scale, tasks.add(0, complex, relative_to));
     let coarse =
         Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale };
-    engine.run::<0>(Kind::Doubled, problem, tasks, &owners, coarse);
+    engine.run_sized::<0>(Kind::Doubled, &problem.theta, tasks, &owners, coarse);
     let doubled = tasks.point(0).to_vec();
     tasks.clear(entry.start.len(), 1);
     let (a, b) = doubled.split_at(entry.start.len());
@@ -33,7 +33,7 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
             *x = a + sign * b;
         }
     }
-    engine.run::<0>(Kind::Real, problem, tasks, &owners, fine);
+    engine.run_sized::<0>(Kind::Real, &problem.theta, tasks, &owners, fine);
     (0..3).map(|task| tasks.reached(task).value).fold(f64::INFINITY, f64::min)
 }
 

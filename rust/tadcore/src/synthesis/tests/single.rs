@@ -8,7 +8,7 @@ use crate::simd::norm;
 
 /// Whether single precision settles a descent from `start` beside a rival, and in how many steps it ends.
 fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival, iterations: usize) -> (bool, usize) {
-    let parts = problem.single.as_ref().expect("a problem in range");
+    let parts = problem.theta.single.as_ref().expect("a problem in range");
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(start);
@@ -25,7 +25,7 @@ fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival,
 fn only_what_cannot_win_is_settled() {
     let (mut count, mut saved, mut little) = (0, 0, 0);
     each(|problem, variables, g| {
-        let (end, reached) = descend(&mut RealGains::<f64, 0>::new(&problem.double), g, variables, None, LIMITS);
+        let (end, reached) = descend(&mut RealGains::<f64, 0>::new(&problem.theta.double), g, variables, None, LIMITS);
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let beside = |lower: f64| {
             let rival = Rival { g: &far, value: reached.value * (1.0 - lower), near: 1e-3 };
@@ -54,7 +54,7 @@ fn only_what_cannot_win_is_settled() {
 fn out_of_range_everything_is_done_in_double() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, p, _) = sample(interaction);
-        assert!(problem.single.is_some());
+        assert!(problem.theta.single.is_some());
         let (m, n) = (problem.rows(), problem.size());
         let topologies: Vec<Topology> = (0..1u64 << (m * n))
             .step_by(if m * n > 9 { 29 } else { 3 })
@@ -68,10 +68,10 @@ fn out_of_range_everything_is_done_in_double() {
         let within = solve(&problem);
         // Powers of two, so that no bit but those of the exponents changes.
         for scale in [2.0_f64.powi(40), 2.0_f64.powi(-40)] {
-            let r = problem.double.r.iter().map(|r| r * scale).collect();
+            let r = problem.theta.double.r.iter().map(|r| r * scale).collect();
             let p: Vec<f64> = p.iter().map(|p| p * scale).collect();
             let scaled = Problem::from_parts(interaction, r, problem.gamma.clone(), &p);
-            assert!(scaled.single.is_none());
+            assert!(scaled.theta.single.is_none());
             for ((gains, expected), topology) in solve(&scaled).iter().zip(&within).zip(&topologies) {
                 let theta = gains.theta / (scale * scale);
                 assert!((theta - expected.theta).abs() <= 1e-12 * (1.0 + expected.theta), "{topology:?}");

@@ -45,6 +45,21 @@ pub(crate) struct Scale {
     pub value: f64,
 }
 
+/// One problem in both precisions.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Precisions {
+    pub double: Parts<f64>,
+    /// In single precision, where that can hold it.
+    pub single: Option<Parts<f32>>,
+}
+
+impl From<Parts<f64>> for Precisions {
+    fn from(double: Parts<f64>) -> Self {
+        let single = double.in_range().then(|| double.rounded());
+        Self { double, single }
+    }
+}
+
 /// Sizes between which sums of squares and their roundings are numbers of single precision.
 const RANGE: (f64, f64) = (1e-9, 1e12);
 

@@ -14,7 +14,7 @@ mod doubled;
 mod problem;
 mod real;
 
-pub(crate) use coefficients::Parts;
+pub(crate) use coefficients::{Parts, Precisions};
 pub(crate) use doubled::Doubled;
 pub use problem::Problem;
 pub(crate) use real::{Certificate, RealGains};

@@ -11,7 +11,7 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
-use super::coefficients::{Parts, Scale};
+use super::coefficients::{Parts, Precisions, Scale};
 use crate::game::{Game, Interaction};
 use crate::simd::{norm, sum_of_squares};
 
@@ -23,9 +23,7 @@ pub struct Problem {
     pub(crate) rows: usize,
     pub(crate) gamma: Vec<f64>,
     /// What Θ is made of.
-    pub(crate) double: Parts<f64>,
-    /// The same in single precision, where that can hold it.
-    pub(crate) single: Option<Parts<f32>>,
+    pub(crate) theta: Precisions,
 }
 
 impl Problem {
@@ -99,8 +97,7 @@ impl Problem {
         let strength = r.iter().map(|r| 4.0 * gamma[0] * r).collect();
         let first = gamma[0];
         let double = Parts { size, rows, first, strength, r, fne, target, coupling, closeness, quadratic, scale };
-        let single = double.in_range().then(|| double.rounded());
-        Self { interaction, size, rows, gamma, double, single }
+        Self { interaction, size, rows, gamma, theta: double.into() }
     }
 
     /// N.
@@ -118,14 +115,14 @@ impl Problem {
     /// The FNE rows F, m × N.
     #[must_use]
     pub fn fne(&self) -> &[f64] {
-        &self.double.fne
+        &self.theta.double.fne
     }
 
     /// The squared residual norms of the gain rows `g`, unweighted and reduced, in the order of γ:
     /// ‖ΔQ_d‖², ‖ΔQ_τ‖², ‖ΔQ_a‖², ‖S₁‖² in I1 (`p`: the Riccati matrices of the instant) and ‖ΔQ‖², ‖S₂‖², ‖S₃‖² in I2.
     #[must_use]
     pub fn terms(&self, p: &[f64], g: &[f64]) -> Vec<f64> {
-        let (n, m, of) = (self.size, self.rows, &self.double);
+        let (n, m, of) = (self.size, self.rows, &self.theta.double);
         let delta: Vec<f64> = g.iter().zip(&of.fne).map(|(g, f)| g - f).collect();
         let closeness = |rows: std::ops::Range<usize>| -> f64 {
             rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (of.r[i] * d).powi(2))).sum()
