@@ -67,7 +67,7 @@ test: test-rust test-python  ## run every test, Rust and Python
 
 # The bindings are named for their features: so tests and extension share one build of the core and its dependencies.
 test-rust:
-	cargo test --release --locked --package tadcore --package tadcore-python
+	cargo test --release --locked --package tadcore --package tadcore-kernels --package tadcore-python
 
 test-python: setup
 	$(BIN)/python -m pytest
@@ -91,7 +91,7 @@ fuzz: setup  ## fuzz the core, the saved gain table and the readers of files, 60
 # A stable compiler that is told to be another; docs/reliability.md says why there is no ThreadSanitizer.
 sanitize:  ## the core's Rust tests under AddressSanitizer (Linux, x86-64)
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Zsanitizer=address CARGO_TARGET_DIR=$(or $(CARGO_TARGET_DIR),target)/sanitize PROPTEST_CASES=8 \
-	  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore --lib --tests --no-fail-fast
+	  cargo test --locked --profile sanitize --target x86_64-unknown-linux-gnu -p tadcore -p tadcore-kernels --lib --tests --no-fail-fast
 
 mutants:  ## mutation testing: flip a sign or swap an operator in each formula of the core, report which Rust test fails
 	$(PYTHON) tests/mutants

@@ -26,10 +26,11 @@ from pathlib import Path
 from listed import EQUIVALENT, MUTANTS
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE = Path("rust/tadcore/src")
+# The core and its kernels, a crate of their own: a file's name is its path in either.
+CRATES = {"tadcore": Path("rust/tadcore/src"), "tadcore_kernels": Path("rust/tadcore-kernels/src")}
 # In this order, but for a room's own tests, in the library and beside it, which are first. Properties draw games from a
 # fixed seed.
-TESTS = ["synthesis", "looks", "tadcore", "paper", "ensemble", "properties", "riccati"]
+TESTS = ["synthesis", "looks", "tadcore_kernels", "tadcore", "paper", "ensemble", "properties", "riccati"]
 ENVIRONMENT = {"PROPTEST_CASES": "24", "PROPTEST_RNG_SEED": "20250117"}
 # Seconds of the processor after which a test program hangs, as a multiple of its time without a mutant and at least; a
 # busy machine changes nothing in them. On the clock, for what sleeps for ever, so many times as long.
@@ -113,14 +114,17 @@ def copy(tree, mutants, lighter):
         old.unlink()
     for path in wanted:
         text = (ROOT / path).read_text()
-        if path.is_relative_to(CORE):
-            own = path.relative_to(CORE).as_posix()
+        root = next((root for root in CRATES.values() if path.is_relative_to(root)), None)
+        if root:
+            own = path.relative_to(root).as_posix()
             if own in lighter:
                 text, count = re.subn(*lighter[own], text, flags=re.M)
                 if not count:
                     sys.exit(f"{own}: nothing to leave out")
-            text = planted(own, text, mutants)
-            text += SWITCH if path == CORE / "lib.rs" else ""
+            # A module that both have is the core's.
+            if root == CRATES["tadcore"] or not (ROOT / CRATES["tadcore"] / own).exists():
+                text = planted(own, text, mutants)
+            text += SWITCH if own == "lib.rs" else ""
         copied = tree / path
         if not copied.exists() or copied.read_text() != text:
             copied.parent.mkdir(parents=True, exist_ok=True)
@@ -129,9 +133,10 @@ def copy(tree, mutants, lighter):
 
 def build(tree, target, name):
     """The program of the tests of this name."""
-    command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", "tadcore", "--no-run"]
+    package = name.replace("_", "-") if name in CRATES else "tadcore"
+    command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", package, "--no-run"]
     out = subprocess.run(
-        [*command, *(["--lib"] if name == "tadcore" else ["--test", name]), "--message-format=json-render-diagnostics"],
+        [*command, *(["--lib"] if name in CRATES else ["--test", name]), "--message-format=json-render-diagnostics"],
         cwd=tree,
         env={**os.environ, "CARGO_TARGET_DIR": str(target)},
         capture_output=True,
@@ -178,7 +183,7 @@ class Programs:
 
     def __init__(self, tree, target, room):
         self.tree, self.target = tree, target
-        own = [("tadcore", f"{room}::")] + [(name, "") for name in TESTS if name == room]
+        own = [(crate, f"{room}::") for crate in CRATES] + [(name, "") for name in TESTS if name == room]
         self.order = own + [(name, "") for name in TESTS if name != room]
         self.built, self.limits = {}, {}
 

@@ -12,6 +12,22 @@ const LAYERS: [&str; 11] =
 const SYNTHESIS: [(&str, &[&str]); 3] =
     [("newton", &["simd"]), ("theta", &["simd", "game"]), ("search", &["simd", "game", "network"])];
 
+/// Every source of the core, with its path from the root of its crate: the kernels, a crate of their own, have modules
+/// of the same names.
+fn core() -> Vec<(PathBuf, PathBuf)> {
+    let roots = ["src", "../tadcore-kernels/src"].map(|root| Path::new(env!("CARGO_MANIFEST_DIR")).join(root));
+    let mut all = Vec::new();
+    for root in roots {
+        let mut files = Vec::new();
+        sources(&root, &mut files);
+        all.extend(files.into_iter().map(|file| {
+            let relative = file.strip_prefix(&root).expect("inside src").to_owned();
+            (file, relative)
+        }));
+    }
+    all
+}
+
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a source folder") {
         let path = entry.expect("an entry").path();
@@ -100,12 +116,9 @@ fn violations(module: &[String], text: &str) -> (Vec<String>, usize) {
 
 #[test]
 fn a_layer_uses_only_layers_above_it() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
     let mut checked = 0;
-    for file in files {
-        let module = module(file.strip_prefix(&root).expect("inside src"));
+    for (file, relative) in core() {
+        let module = module(&relative);
         let (wrong, count) = violations(&module, &fs::read_to_string(&file).expect("a readable source"));
         assert!(wrong.is_empty(), "{}: {wrong:#?}", file.display());
         checked += count;
@@ -152,8 +165,11 @@ fn a_use_of_what_stands_below_is_found() {
 
 #[test]
 fn the_core_knows_nothing_of_python() {
-    let manifest = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml")).expect("a manifest");
-    assert!(!manifest.contains("pyo3") && !manifest.contains("numpy"));
+    for manifest in ["Cargo.toml", "../tadcore-kernels/Cargo.toml"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(manifest);
+        let manifest = fs::read_to_string(path).expect("a manifest");
+        assert!(!manifest.contains("pyo3") && !manifest.contains("numpy"));
+    }
 }
 
 /// The lines of a source text, comments included, in which `unsafe` is a word of its own.
@@ -164,13 +180,10 @@ fn unsafe_lines(text: &str) -> Vec<usize> {
 
 #[test]
 fn unsafe_code_stands_in_simd_alone() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
     let mut inside = 0;
-    for file in files {
+    for (file, relative) in core() {
         let found = unsafe_lines(&fs::read_to_string(&file).expect("a readable source"));
-        if file.starts_with(root.join("simd")) {
+        if relative.starts_with("simd") {
             inside += found.len();
         } else {
             assert!(found.is_empty(), "{}: unsafe in lines {found:?}", file.display());
@@ -194,10 +207,7 @@ fn planted_unsafe_code_is_found() {
 /// shared unless a type says of itself that it can, and nothing here does. What is unsafe are vector instructions.
 #[test]
 fn nothing_unsafe_is_shared_between_threads() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    sources(&root, &mut files);
-    for file in files {
+    for (file, _) in core() {
         let text = fs::read_to_string(&file).expect("a readable source");
         let code: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
         for word in ["unsafe impl", "static mut", "UnsafeCell", "transmute"] {

@@ -48,6 +48,9 @@
 //! | [`cost`] | J of every player along a run |
 //! | [`ensemble`] | many runs, outcomes only |
 //!
+//! What is compiled for many sizes and widths, and therefore takes long, is a crate of its own, `tadcore-kernels`, with
+//! modules of the same names: `simd`, and of `synthesis`, `policy` and `ensemble` what knows no game and no network.
+//!
 //! ## Reduced matrices
 //!
 //! Every weight of the paper is a scalar times **I**₂, so every matrix is a small factor ⊗ **I**₂ and only the factor is
@@ -67,6 +70,7 @@ pub mod game;
 pub mod network;
 pub mod policy;
 pub mod riccati;
-pub mod simd;
 pub mod simulation;
 pub mod synthesis;
+
+pub use tadcore_kernels::simd;

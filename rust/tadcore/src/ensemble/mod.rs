@@ -11,10 +11,7 @@
 //! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
-mod anysize;
 mod chunk;
-mod strip;
-mod sweep;
 
 use std::thread::available_parallelism;
 
@@ -26,6 +23,7 @@ use crate::policy::Policy;
 use crate::simd::Width;
 use crate::simulation::{Outcome, Setup};
 use chunk::{Chunk, End, Worker};
+use tadcore_kernels::ensemble::{strip, sweep};
 
 /// Trials of one chunk at most.
 pub const CHUNK: usize = 8192;
@@ -119,6 +117,9 @@ fn play(
     pool.install(|| ends.par_chunks_mut(size).enumerate().try_for_each_init(|| Worker::new(policy), one))?;
     Ok(())
 }
+
+#[cfg(test)]
+mod sweep_tests;
 
 #[cfg(test)]
 mod tests {

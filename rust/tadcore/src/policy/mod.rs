@@ -15,11 +15,8 @@ mod budget;
 pub mod closed_loop;
 pub mod exponential;
 pub(crate) mod filler;
-mod hash_table;
-pub(crate) mod index;
 mod relabelling;
 mod saved;
-pub(crate) mod step_table;
 mod table;
 pub(crate) mod transitions;
 
@@ -27,6 +24,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 pub use table::{DEFAULT_TABLE_BYTES, TableStats};
+pub(crate) use tadcore_kernels::policy::step_table;
 
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, TableError};

@@ -27,13 +27,13 @@
 //! Sizes N ≤ 8 are compiled with constant loop bounds (measured at n = 3: 2.6 times as fast as with bounds known at run
 //! time); larger ones share one version whose factorisations go to faer.
 
-mod newton;
 pub mod search;
 mod theta;
 
 pub use newton::Status;
 pub use search::Look;
 pub(crate) use search::SIDE_BY_SIDE_UP_TO;
+pub(crate) use tadcore_kernels::synthesis::newton;
 pub use theta::Problem;
 
 use crate::network::Topology;

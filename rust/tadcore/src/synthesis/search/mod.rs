@@ -29,7 +29,6 @@
 //! | `stages` | the stages above |
 
 mod candidate;
-mod dispatch;
 mod gradient;
 mod stages;
 mod start;
@@ -44,3 +43,4 @@ pub(crate) use stages::Search;
 #[cfg(test)]
 pub(crate) use stages::{BASIN, LONGEST_STEP, LOOK_ITERATIONS, far_start};
 pub(crate) use start::{canonical, paper_variables, variables};
+pub(crate) use tadcore_kernels::synthesis::search::dispatch;

@@ -9,12 +9,9 @@
 //! | `real` | Θ over the gains, and the certificate of a global minimum |
 //! | `doubled` | Θ over twice as many gains, complex or stacked |
 
-mod coefficients;
-mod doubled;
 mod problem;
-mod real;
 
-pub(crate) use coefficients::{Parts, Precisions};
-pub(crate) use doubled::Doubled;
 pub use problem::Problem;
-pub(crate) use real::{Certificate, RealGains};
+#[cfg(test)]
+pub(crate) use tadcore_kernels::synthesis::theta::Doubled;
+pub(crate) use tadcore_kernels::synthesis::theta::{Parts, Precisions, RealGains, Scale};

@@ -11,7 +11,7 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
-use super::coefficients::{Parts, Precisions, Scale};
+use super::{Parts, Precisions, Scale};
 use crate::game::{Game, Interaction};
 use crate::simd::{norm, sum_of_squares};
 

@@ -1,0 +1,252 @@
+//! One step of eight trials at a time: who is caught, who sees whom, and the product, in vector registers.
+//!
+//! Every sum runs in the order of a run that is recorded and no product is fused with a sum, so that a trial
+//! ends as it would alone, to the bit, at every [`Width`].
+//!
+//! Memory is what a step waits for, so nothing is asked for when it is needed: a block of strips is looked at before any
+//! of them moves, which puts independent work between a lookup and the product that needs it, and every block fetches a
+//! part of the next instant's shelf.
+
+use super::anysize::sweep_any;
+use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
+use crate::policy::index::DIRECT_BITS;
+use crate::policy::step_table::Shelf;
+use crate::simd::{Number, Simd, Width, dispatch};
+
+/// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
+/// cache in between.
+const BLOCK: usize = 16;
+
+/// Lines of the next instant's shelf that a strip fetches at most: few strips need few entries.
+const MOST_LINES: usize = 8;
+
+/// An index that knows no topology.
+static NOTHING: [u16; 1 << DIRECT_BITS] = [0; 1 << DIRECT_BITS];
+
+/// Repeats a block for the constants 0…7 that lie below a limit known to the compiler.
+macro_rules! unrolled {
+    ($i:ident < $limit:expr, $body:block) => {
+        unrolled!(@ $i $limit, $body, 0 1 2 3 4 5 6 7)
+    };
+    (@ $i:ident $limit:expr, $body:block, $($value:literal)*) => {
+        $({
+            const $i: usize = $value;
+            if $i < $limit $body
+        })*
+    };
+}
+
+// No closures below: they are functions of their own, and the compiler would not inline the wide instructions into them.
+
+/// ‖z_i‖² of eight trials, the axes added in order.
+#[inline(always)]
+fn norm<V: Simd, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
+    let first = V::Eight::load(&z[i * D]);
+    let mut sum = first * first;
+    for x in 1..D {
+        let a = V::Eight::load(&z[i * D + x]);
+        sum = sum + a * a;
+    }
+    sum
+}
+
+/// ‖z_i − z_j‖² of eight trials.
+#[inline(always)]
+fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight {
+    let first = V::Eight::load(&z[i * D]) - V::Eight::load(&z[j * D]);
+    let mut sum = first * first;
+    for x in 1..D {
+        let a = V::Eight::load(&z[i * D + x]) - V::Eight::load(&z[j * D + x]);
+        sum = sum + a * a;
+    }
+    sum
+}
+
+/// The keys of one strip, and a bit for each trial in which somebody is caught.
+#[inline(always)]
+pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
+    z: &[Lane],
+    sight: &[Lane],
+    capture: &[Lane],
+) -> (V::Keys, u8) {
+    let mut keys = V::no_keys();
+    let mut caught = 0;
+    unrolled!(I < N, {
+        let d2 = norm::<V, D>(z, I);
+        caught |= V::Eight::bits(d2.at_most(V::Eight::load(&capture[I]))) as u8;
+        if I < M {
+            keys = V::set(keys, 1 << (I * N + I), d2.at_most(V::Eight::load(&sight[I])));
+        }
+        unrolled!(J < I, {
+            let d2 = distance::<V, D>(z, I, J);
+            if I < M {
+                keys = V::set(keys, 1 << (I * N + J), d2.at_most(V::Eight::load(&sight[I])));
+            }
+            keys = V::set(keys, 1 << (J * N + I), d2.at_most(V::Eight::load(&sight[J])));
+        });
+    });
+    (keys, caught)
+}
+
+/// z ← exp(Cδ) z for one strip whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
+#[inline(always)]
+fn step<V: Simd, const N: usize, const D: usize, const Q: usize, const E: usize>(
+    z: &mut [Lane],
+    slots: &[u32; LANES],
+    matrices: &[[[f64; 4]; E]],
+) {
+    for half in 0..2 {
+        let mut next = [[[V::Four::splat(0.0); 4]; Q]; D];
+        for l in 0..4 {
+            let lane = 4 * half + l;
+            let t = &matrices[slots[lane] as usize];
+            for q in 0..Q {
+                for x in 0..D {
+                    next[x][q][l] = V::Four::load(&t[q]) * V::Four::splat(z[x][lane]);
+                }
+                for j in 1..N {
+                    let column = V::Four::load(&t[j * Q + q]);
+                    for x in 0..D {
+                        // Rounded twice: no product is fused with a sum.
+                        next[x][q][l] = next[x][q][l] + column * V::Four::splat(z[j * D + x][lane]);
+                    }
+                }
+            }
+        }
+        for x in 0..D {
+            for q in 0..Q {
+                let rows = V::transpose(next[x][q]);
+                for r in 0..4 {
+                    if 4 * q + r < N {
+                        rows[r].store(&mut z[(4 * q + r) * D + x][4 * half..]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Keys that are their own index are read as words of 16 bits.
+const _: () = assert!(DIRECT_BITS <= 16);
+
+/// Writes the slots of eight topologies; whether all are on the shelf.
+#[inline(always)]
+fn look_up<V: Simd, const N: usize, const M: usize>(
+    seen: V::Keys,
+    direct: &[u16],
+    shelf: &Shelf,
+    slots: &mut [u32; LANES],
+) -> bool {
+    let mut all = true;
+    if N * M <= DIRECT_BITS {
+        let mut low = V::low(seen);
+        for half in 0..2 {
+            for l in 0..LANES / 2 {
+                // The mask changes nothing; it tells the compiler that the index lies within the slice.
+                let slot = u32::from(direct[low[half] as usize & (direct.len() - 1)]);
+                low[half] >>= 16;
+                slots[half * LANES / 2 + l] = slot;
+                all &= slot != 0;
+            }
+        }
+    } else {
+        for (slot, key) in slots.iter_mut().zip(V::keys(seen)) {
+            *slot = shelf.find(&[key]);
+            all &= *slot != 0;
+        }
+    }
+    all
+}
+
+/// One step of the strips from one on, as far as they can move: a [`Sweep`].
+#[inline(always)]
+fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
+    strips: &mut Strips,
+    from: usize,
+    shelf: &Shelf,
+    next: Option<&Shelf>,
+    keys: &mut Keys,
+) -> Stop {
+    let matrices = shelf.matrices().as_chunks().0.as_chunks().0;
+    let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
+    let direct = shelf.direct().get(..places).unwrap_or(&NOTHING[..places]);
+    let end = strips.live.div_ceil(LANES);
+    let mut slots = [[0; LANES]; BLOCK];
+    let mut first = from;
+    while first < end {
+        let count = BLOCK.min(end - first);
+        if let Some(next) = next {
+            // As many lines for each strip of a step.
+            let lines = next.lines();
+            let share = lines.div_ceil(end).min(MOST_LINES);
+            for line in first * share..((first + count) * share).min(lines) {
+                next.prefetch(line);
+            }
+        }
+        let (mut ready, mut stop) = (0, Stop::End);
+        let block = &mut strips.z[first * N * D..][..count * N * D];
+        for (z, slots) in block.chunks_exact(N * D).zip(&mut slots) {
+            let strip = first + ready;
+            let sight = &strips.sight[strip * strips.sight_step..][..M];
+            let capture = &strips.capture[strip * strips.capture_step..][..N];
+            let (seen, caught) = observe::<V, N, M, D>(z, sight, capture);
+            if caught != 0 {
+                let caught = u32::from(caught) & playing(strips.live, strip);
+                if caught != 0 {
+                    stop = Stop::Caught(strip, caught);
+                    break;
+                }
+            }
+            if !look_up::<V, N, M>(seen, direct, shelf, slots) {
+                keys[0] = V::keys(seen);
+                stop = Stop::Missing(strip);
+                break;
+            }
+            ready += 1;
+        }
+        for (z, slots) in block.chunks_exact_mut(N * D).zip(&slots[..ready]) {
+            step::<V, N, D, Q, E>(z, slots, matrices);
+        }
+        if stop != Stop::End {
+            return stop;
+        }
+        first += ready;
+    }
+    Stop::End
+}
+
+dispatch! {
+    /// A sweep compiled for its sizes.
+    fn sized<V, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
+        shape: &Shape,
+        strips: &mut Strips,
+        from: usize,
+        shelf: &Shelf,
+        next: Option<&Shelf>,
+        keys: &mut Keys,
+    ) -> Stop {
+        if const { V::SIZED } {
+            sweep::<V, N, M, D, Q, E>(strips, from, shelf, next, keys)
+        } else {
+            // Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+            sweep_any(Width::Baseline, shape, strips, from, shelf, next, keys)
+        }
+    }
+}
+
+/// The sweep for a shape: compiled for N ≤ 8 in the plane and in space, one version for all else.
+// Inlined, it would have every version compiled once more where it is called.
+#[inline(never)]
+pub fn sweep_of(shape: &Shape) -> Sweep {
+    macro_rules! choose {
+        ($($n:literal $m:literal $q:literal;)*) => {
+            match (shape.size, shape.rows, shape.dim) {
+                $(($n, $m, 2) => sized::<$n, $m, 2, $q, { $n * $q }>, ($n, $m, 3) => sized::<$n, $m, 3, $q, { $n * $q }>,)*
+                _ => sweep_any,
+            }
+        };
+    }
+    choose! {
+        2 1 1; 2 2 1; 3 2 1; 3 3 1; 4 3 1; 4 4 1; 5 4 2; 5 5 2; 6 5 2; 6 6 2; 7 6 2; 7 7 2; 8 7 2; 8 8 2;
+    }
+}

@@ -1,0 +1,192 @@
+//! The transitions of one grid instant, by topology: what an ensemble reads at every step.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | exp(Cδ) | [`Shelf::matrices`] from `slot × stride` | by columns, each padded with zeros to [`padded`] rows |
+//! | 𝒜 | the words of a topology | the key |
+//!
+//! Where an entry lies is its slot ([`super::index`]). Slot 0 is never a topology's: a lookup that gives 0 found nothing.
+
+use super::index::Index;
+use crate::simd::prefetch;
+
+/// Bytes of a cache line.
+const LINE: usize = 64;
+/// Slots of a direct index in one.
+const DIRECT_LINE: usize = LINE / size_of::<u16>();
+/// Numbers of a matrix in one.
+const MATRIX_LINE: usize = LINE / size_of::<f64>();
+
+/// Rows of a stored column for matrices of `n` rows: whole vectors of four.
+#[must_use]
+pub fn padded(n: usize) -> usize {
+    n.next_multiple_of(4)
+}
+
+/// The transitions of one instant.
+#[derive(Debug)]
+pub struct Shelf {
+    index: Index,
+    /// By model: the slot of the first topology that was derived from it.
+    models: Index,
+    matrices: Vec<f64>,
+    keys: Vec<u64>,
+    bits: usize,
+    stride: usize,
+    /// Numbers before the first matrix.
+    skip: usize,
+}
+
+impl Shelf {
+    /// An empty shelf for N = `size` and `rows` constrained players.
+    pub fn new(rows: usize, size: usize) -> Self {
+        let bits = rows * size;
+        let (index, models) = (Index::new(bits, true), Index::new(bits, false));
+        Self { index, models, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size), skip: 0 }
+    }
+
+    /// The slot of a topology's entry, 0 where there is none.
+    #[inline(always)]
+    pub fn find(&self, words: &[u64]) -> u32 {
+        self.index.find(words)
+    }
+
+    /// The slot of a topology with this model, 0 where there is none.
+    pub fn find_model(&self, words: &[u64]) -> u32 {
+        self.models.find(words)
+    }
+
+    /// The slots by key of a shelf with at most [`DIRECT_BITS`](super::index::DIRECT_BITS) bits, for sweeps that know their size.
+    #[inline(always)]
+    pub fn direct(&self) -> &[u16] {
+        match &self.index {
+            Index::Direct(slots) => slots,
+            _ => &[],
+        }
+    }
+
+    /// All matrices, one every `stride` numbers, the first at the start of a cache line.
+    #[inline(always)]
+    pub fn matrices(&self) -> &[f64] {
+        &self.matrices[self.skip..]
+    }
+
+    /// Cache lines that lookups read: the index of a direct shelf, then the matrices.
+    #[inline(always)]
+    pub fn lines(&self) -> usize {
+        self.direct().len() / DIRECT_LINE + self.matrices().len().div_ceil(MATRIX_LINE)
+    }
+
+    /// Fetches one of these lines into the second cache.
+    #[inline(always)]
+    pub fn prefetch(&self, line: usize) {
+        match line.checked_sub(self.direct().len() / DIRECT_LINE) {
+            None => prefetch(self.direct(), line * DIRECT_LINE),
+            Some(line) => prefetch(&self.matrices, self.skip + line * MATRIX_LINE),
+        }
+    }
+
+    /// Entries held.
+    pub fn len(&self) -> usize {
+        self.keys.len() / self.bits.div_ceil(64)
+    }
+
+    /// The keys in the order of their slots, the first of slot 1.
+    pub fn keys(&self) -> std::slice::ChunksExact<'_, u64> {
+        self.keys.chunks_exact(self.bits.div_ceil(64))
+    }
+
+    /// The key in a slot.
+    pub fn key(&self, slot: usize) -> &[u64] {
+        let words = self.bits.div_ceil(64);
+        &self.keys[(slot - 1) * words..][..words]
+    }
+
+    /// The matrix in a slot.
+    pub fn matrix(&self, slot: usize) -> &[f64] {
+        &self.matrices()[slot * self.stride..][..self.stride]
+    }
+
+    /// Bytes that one more entry takes, the shelf's own memory with the first; `shared` if it may have a model.
+    pub fn entry_bytes(&self, shared: bool) -> usize {
+        let words = self.bits.div_ceil(64);
+        let models = if shared { self.models.entry_bytes(self.bits) } else { 0 };
+        // A vector that grows by doubling is up to half empty.
+        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words) + self.index.entry_bytes(self.bits) + models
+    }
+
+    /// Adds an entry that is not there yet, and its model if it may have one.
+    pub fn insert(&mut self, words: &[u64], model: Option<&[u64]>, matrix: &[f64]) {
+        debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
+        if self.matrices.capacity() < self.matrices.len() + self.stride {
+            self.grow();
+        }
+        let slot = self.matrices().len() / self.stride;
+        self.matrices.extend_from_slice(matrix);
+        self.keys.extend_from_slice(words);
+        self.index.insert(words, slot, self.bits);
+        if let Some(model) = model.filter(|model| self.models.find(model) == 0) {
+            self.models.insert(model, slot, self.bits);
+        }
+    }
+
+    /// Doubles the room for matrices; slot 0 is there from the beginning.
+    fn grow(&mut self) {
+        let held = self.matrices().len().max(self.stride);
+        let most = MATRIX_LINE - 1;
+        let mut larger = Vec::<f64>::with_capacity(2 * held + most);
+        let skip = larger.as_ptr().align_offset(LINE).min(most);
+        larger.resize(skip, 0.0);
+        larger.extend_from_slice(self.matrices());
+        larger.resize(skip + held, 0.0);
+        (self.matrices, self.skip) = (larger, skip);
+    }
+
+    /// Forgets every entry and keeps the memory.
+    pub fn clear(&mut self) {
+        self.matrices.truncate(self.skip + self.stride);
+        self.keys.clear();
+        self.index.clear();
+        self.models.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Thousands of entries of each kind of key, each found again with its own matrix, and nothing else found.
+    #[test]
+    fn every_entry_is_found_again() {
+        for (rows, size) in [(3, 4), (4, 4), (4, 5), (8, 8), (8, 9), (12, 13)] {
+            let mut shelf = Shelf::new(rows, size);
+            let (bits, stride) = (rows * size, size * padded(size));
+            let mask = if bits >= 64 { u64::MAX } else { (1 << bits) - 1 };
+            let key = |i: u64| -> Vec<u64> {
+                let mixed = i.wrapping_mul(0x2545_F491_4F6C_DD1D);
+                let last = if bits % 64 == 0 { u64::MAX } else { (1 << (bits % 64)) - 1 };
+                match bits.div_ceil(64) {
+                    1 => vec![if bits <= 16 { i } else { mixed } & mask],
+                    words => (0..words).map(|w| if w == 0 { i } else { mixed & last }).collect(),
+                }
+            };
+            for i in 0..3000 {
+                assert_eq!(shelf.find(&key(i)), 0, "{rows} {size} {i}");
+                shelf.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]);
+            }
+            assert_eq!(shelf.len(), 3000);
+            for i in 0..3000 {
+                let slot = shelf.find(&key(i)) as usize;
+                assert_eq!(slot, i as usize + 1);
+                assert!(shelf.matrix(slot).iter().all(|&x| x == i as f64));
+                assert_eq!(shelf.key(slot), key(i));
+                // Two entries each have the first as their model.
+                assert_eq!(shelf.find_model(&key(i)), if i % 2 == 0 { i as u32 + 1 } else { 0 });
+            }
+            assert_eq!(shelf.matrices().as_ptr().align_offset(LINE), 0);
+            assert_eq!(shelf.find(&key(3000)), 0);
+            shelf.clear();
+            assert_eq!((shelf.find(&key(5)), shelf.find_model(&key(4)), shelf.len()), (0, 0, 0));
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The instructions of a width: how many numbers its registers hold, and what is not done lane by lane.
+
+#[cfg(not(target_arch = "aarch64"))]
+use super::group::Group;
+use super::number::Number;
+
+/// A width's instructions.
+///
+/// The methods of the wide ones are inlined into functions that are compiled for them, and reached only through a
+/// [`Width`](super::Width) that the processor confirmed.
+pub trait Simd: Copy {
+    /// Four numbers.
+    type Four: Number<Scalar = f64>;
+    /// Eight numbers.
+    type Eight: Number<Scalar = f64>;
+    /// Eight keys of 64 bits.
+    type Keys: Copy;
+    /// A register of numbers, for problems side by side.
+    type Double: Number<Scalar = f64>;
+    /// The same in single precision.
+    type Single: Number<Scalar = f32>;
+    /// In single precision, as many as keep the larger matrices in the first cache.
+    type Half: Number<Scalar = f32>;
+    /// How many sums of eight numbers fit beside what goes into them: rows of a tile.
+    const ROWS: usize;
+    /// Whether loops are compiled for every size; where they are slow anyway, one version for all sizes will do.
+    const SIZED: bool;
+
+    /// Rows as columns.
+    fn transpose(rows: [Self::Four; 4]) -> [Self::Four; 4];
+    /// The first four of eight, and the others.
+    fn halves(eight: Self::Eight) -> [Self::Four; 2];
+    fn no_keys() -> Self::Keys;
+    /// The keys with `bit` set in the lanes of a mask.
+    fn set(keys: Self::Keys, bit: u64, lanes: <Self::Eight as Number>::Mask) -> Self::Keys;
+    fn keys(keys: Self::Keys) -> [u64; 8];
+    /// The low 16 bits of each key, four in a word.
+    fn low(keys: Self::Keys) -> [u64; 2];
+}
+
+/// What the target guarantees: numbers one by one, or the registers of NEON.
+#[derive(Debug, Clone, Copy)]
+pub struct Baseline;
+
+#[cfg(not(target_arch = "aarch64"))]
+impl Simd for Baseline {
+    type Four = Group<f64, 4>;
+    type Eight = Group<f64, 8>;
+    type Keys = [u64; 8];
+    type Double = f64;
+    type Single = f32;
+    type Half = f32;
+    const ROWS: usize = 4;
+    const SIZED: bool = false;
+
+    #[inline(always)]
+    fn transpose(rows: [Group<f64, 4>; 4]) -> [Group<f64, 4>; 4] {
+        std::array::from_fn(|c| Group(std::array::from_fn(|r| rows[r].0[c])))
+    }
+    #[inline(always)]
+    fn halves(Group(eight): Group<f64, 8>) -> [Group<f64, 4>; 2] {
+        std::array::from_fn(|h| Group(std::array::from_fn(|c| eight[4 * h + c])))
+    }
+    #[inline(always)]
+    fn no_keys() -> [u64; 8] {
+        [0; 8]
+    }
+    #[inline(always)]
+    fn set(keys: [u64; 8], bit: u64, lanes: [bool; 8]) -> [u64; 8] {
+        std::array::from_fn(|l| keys[l] | if lanes[l] { bit } else { 0 })
+    }
+    #[inline(always)]
+    fn keys(keys: [u64; 8]) -> [u64; 8] {
+        keys
+    }
+    #[inline(always)]
+    fn low(keys: [u64; 8]) -> [u64; 2] {
+        low(keys)
+    }
+}
+
+/// The low 16 bits of each key, four in a word.
+#[inline(always)]
+pub fn low(keys: [u64; 8]) -> [u64; 2] {
+    [0, 4].map(|first| (0..4).fold(0, |word, l| word | (keys[first + l] & 0xFFFF) << (16 * l)))
+}

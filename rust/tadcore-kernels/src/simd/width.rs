@@ -1,0 +1,144 @@
+//! How wide the processor's vectors are.
+//!
+//! The environment variable `TADCORE_SIMD` (`baseline`, `avx2` or `avx512`) chooses a width below the widest, for tests
+//! and benches. It is read once; what is no width, or none of this processor, is refused when a game is made.
+
+use std::env;
+use std::sync::OnceLock;
+
+use crate::error::SimdError;
+
+/// The variable that chooses.
+const VARIABLE: &str = "TADCORE_SIMD";
+/// What it may say, the narrowest first.
+const NAMES: [&str; 3] = ["baseline", "avx2", "avx512"];
+
+/// The name of the width in use: the widest that this processor has, or the one that `TADCORE_SIMD` chose.
+///
+/// # Errors
+/// [`SimdError`] when `TADCORE_SIMD` names no width, or one that this processor does not have.
+pub fn in_use() -> Result<&'static str, SimdError> {
+    Width::chosen().map(Width::name)
+}
+
+/// Which instructions the processor has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Width {
+    /// Whatever the target guarantees.
+    Baseline,
+    /// 256 bits and fused operations; only made by [`Width::all`] after asking the processor.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// 512 bits (AVX-512F and VL), and all of the above; only made by [`Width::all`].
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Width {
+    /// The width in use.
+    pub fn chosen() -> Result<Self, SimdError> {
+        static CHOSEN: OnceLock<Result<Width, SimdError>> = OnceLock::new();
+        CHOSEN.get_or_init(|| Self::choose(env::var_os(VARIABLE).map(|v| v.to_string_lossy().into_owned()))).clone()
+    }
+
+    /// The width in use, where a game has been made already: it has checked that there is one.
+    ///
+    /// # Panics
+    /// When `TADCORE_SIMD` cannot be followed and there is no game.
+    pub fn in_use() -> Self {
+        #[expect(clippy::panic, reason = "without a game nothing else can refuse, and nothing may ignore it")]
+        Self::chosen().unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// What the variable asks for; the widest if it asks for nothing.
+    fn choose(wanted: Option<String>) -> Result<Self, SimdError> {
+        let all = Self::all();
+        let Some(value) = wanted.filter(|value| !value.is_empty()) else {
+            return Ok(all.last().copied().unwrap_or(Self::Baseline));
+        };
+        let found = all.iter().copied().find(|width| width.name() == value);
+        found.ok_or_else(|| {
+            let available = all.into_iter().map(Self::name).collect();
+            if NAMES.contains(&value.as_str()) {
+                SimdError::Absent { value, available }
+            } else {
+                SimdError::Unknown { value, allowed: &NAMES, available }
+            }
+        })
+    }
+
+    /// Its name in the environment variable.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => NAMES[0],
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => NAMES[1],
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => NAMES[2],
+        }
+    }
+
+    /// Every width that this processor has, the narrowest first.
+    pub fn all() -> Vec<Self> {
+        let known = [
+            Self::Baseline,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512,
+        ];
+        known.into_iter().filter(|width| width.is_there()).collect()
+    }
+
+    /// Whether this processor has it.
+    pub fn is_there(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_there()
+                    && std::arch::is_x86_feature_detected!("avx512f")
+                    && std::arch::is_x86_feature_detected!("avx512vl")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_variable_chooses_among_the_widths_of_the_processor() {
+        let all = Width::all();
+        assert_eq!(all[0], Width::Baseline);
+        for unset in [None, Some(String::new())] {
+            assert_eq!(Width::choose(unset), Ok(all[all.len() - 1]));
+        }
+        let available: Vec<_> = all.iter().map(|width| width.name()).collect();
+        for name in NAMES {
+            let found = Width::choose(Some(name.to_owned()));
+            match all.iter().find(|width| width.name() == name) {
+                Some(&width) => assert_eq!(found, Ok(width)),
+                None => {
+                    let (value, available) = (name.to_owned(), available.clone());
+                    assert_eq!(found, Err(SimdError::Absent { value, available }));
+                }
+            }
+        }
+        for name in ["AVX2", "avx", "sse2", "avx2 ", "0"] {
+            let error = Width::choose(Some(name.to_owned())).expect_err("no width");
+            let allowed = "it must be baseline, avx2 or avx512 (or empty: the widest); this processor has baseline";
+            assert!(error.to_string().starts_with(&format!("TADCORE_SIMD is {name:?}, but {allowed}")), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_width_that_the_processor_lacks_is_named_with_those_it_has() {
+        let error = SimdError::Absent { value: "avx512".to_owned(), available: vec!["baseline", "avx2"] };
+        let said = "TADCORE_SIMD is \"avx512\", but this processor has only baseline, avx2";
+        assert_eq!(error.to_string(), said);
+    }
+}

@@ -1,0 +1,5 @@
+//! Descents on Θ.
+
+pub mod newton;
+pub mod search;
+pub mod theta;

@@ -1,0 +1,261 @@
+//! Factorisation of small dense symmetric matrices, H + μ**I** = **L D L**ᵀ with a unit diagonal in **L**, and the solves
+//! that go with it.
+//!
+//! Newton systems here have at most mN unknowns: 12 for three defenders, where plain loops beat any library call, some
+//! 100 for fourteen, where they still take a quarter of faer's time, and 200 to 420 for twenty, half of it. Past
+//! [`LIBRARY_SIZE`] unknowns faer's blocked factorisation takes over.
+//!
+//! The loops work on tiles of 4 × 4 entries, which stay in registers while products of the columns before them come off;
+//! four divisions follow one another in a tile of the diagonal, and nothing else waits. There is no square root. A factor
+//! holds **L** below its diagonal, C = **LD** above it (entry (j, i), j < i, is C_ij), and 1/D on it: what a tile takes
+//! off its neighbours lies together in memory, by rows and by columns.
+
+use faer::linalg::cholesky::ldlt::factor;
+use faer::{MatMut, Par};
+
+use super::factor_one::factorise_one;
+use super::layout::{GROUP, Layout, packed};
+use super::tile::{Pivots, diagonal, tile};
+use crate::simd::{Number, Width};
+
+/// Unknowns from which faer's factorisation may be used.
+const LIBRARY_SIZE: usize = 512;
+
+/// What may work on one matrix at a time.
+#[derive(Debug, Clone, Copy)]
+pub struct Means {
+    /// faer, on large matrices; its bits differ from those of the loops here.
+    pub library: bool,
+    /// Registers, with the same bits.
+    pub width: Width,
+}
+
+/// Factorises H + μI, given by its packed lower triangle, into `f`, and says in which lanes it is positive definite to
+/// working precision. Where it is not, the second answer is the pivot that failed, its sign turned: about what μ lacks.
+///
+/// An unknown that a lane does not have (`layout`) has the unit row there.
+#[inline(always)]
+pub fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, means: Means, f: &mut [T]) -> (T::Mask, T) {
+    let d = layout.len();
+    if let (Some(h), Some(f)) = (T::alone(h), T::alone_mut(f)) {
+        let (damping, used) = (damping.lane(0), layout.used());
+        let (definite, lack) = if means.library && d >= LIBRARY_SIZE {
+            (factorise_large(h, damping, used, d, f), 0.0)
+        } else {
+            factorise_one(means.width, h, damping, used, d, f)
+        };
+        return (T::mask(u16::from(definite)), T::splat(lack));
+    }
+    let mut pivots = Pivots::new();
+    for first in (0..d).step_by(GROUP) {
+        let active = std::array::from_fn(|j| layout.active(first + j));
+        factorise_columns(h, damping, first, active, f, d, &mut pivots);
+    }
+    (T::mask(pivots.ok), pivots.lack)
+}
+
+/// The columns of one tile.
+#[inline(always)]
+fn factorise_columns<T: Number>(
+    h: &[T],
+    damping: T,
+    first: usize,
+    active: [T::Mask; GROUP],
+    f: &mut [T],
+    d: usize,
+    pivots: &mut Pivots<T>,
+) {
+    let mut on = tile(h, first, first, damping, f, d);
+    let reciprocal = diagonal(&mut on, first, h, damping, active, f, d, pivots);
+    for row in (first + GROUP..d).step_by(GROUP) {
+        let mut below = tile(h, row, first, damping, f, d);
+        let mut l = [[T::splat(0.0); GROUP]; GROUP];
+        for j in 0..GROUP {
+            for i in 0..GROUP {
+                l[i][j] = below[i][j] * reciprocal[j];
+                for k in j + 1..GROUP {
+                    below[i][k] = below[i][k].minus(l[i][j], on[k][j]);
+                }
+            }
+        }
+        for i in 0..GROUP {
+            f[(row + i) * d + first..][..GROUP].copy_from_slice(&l[i]);
+        }
+        for j in 0..GROUP {
+            let column = [below[0][j], below[1][j], below[2][j], below[3][j]];
+            f[(first + j) * d + row..][..GROUP].copy_from_slice(&column);
+        }
+    }
+}
+
+#[inline(never)]
+fn factorise_large(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> bool {
+    for i in 0..d {
+        f[i * d..][..i + 1].copy_from_slice(&h[packed(i)..][..i + 1]);
+        f[i * d + i] = if i < used { f[i * d + i] + damping } else { 1.0 };
+    }
+    // faer reads columns: the transposed view turns our lower triangle, stored by rows, into its row-strided one.
+    let mut view = MatMut::from_row_major_slice_mut(&mut f[..d * d], d, d);
+    let need = factor::cholesky_in_place_scratch::<f64>(d, Par::Seq, faer::Spec::default());
+    let mut memory = faer::dyn_stack::MemBuffer::new(need);
+    let stack = faer::dyn_stack::MemStack::new(&mut memory);
+    let signs = factor::LdltRegularization::default();
+    if factor::cholesky_in_place(view.as_mut(), signs, Par::Seq, stack, faer::Spec::default()).is_err() {
+        return false;
+    }
+    for j in 0..d {
+        let pivot = f[j * d + j];
+        if !pivot.is_finite() || pivot <= 0.0 {
+            return false;
+        }
+        for i in j + 1..d {
+            f[j * d + i] = f[i * d + j] * pivot;
+        }
+        f[j * d + j] = 1.0 / pivot;
+    }
+    true
+}
+
+/// x := (**LD**)⁻¹x; the sum Σx²/D of **L**⁻¹x, that is xᵀ(H + μ**I**)⁻¹x of the x given.
+#[inline(always)]
+pub fn forward<T: Number>(f: &[T], d: usize, x: &mut [T]) -> T {
+    let mut sum = T::splat(0.0);
+    for first in (0..d).step_by(GROUP) {
+        let (mut y, mut z) = ([T::splat(0.0); GROUP], [T::splat(0.0); GROUP]);
+        y.copy_from_slice(&x[first..first + GROUP]);
+        let c: [&[T]; GROUP] = std::array::from_fn(|j| &f[(first + j) * d..][..d]);
+        for j in 0..GROUP {
+            z[j] = y[j] * c[j][first + j];
+            sum = sum.plus(y[j], z[j]);
+            for i in j + 1..GROUP {
+                y[i] = y[i].minus(z[j], c[j][first + i]);
+            }
+        }
+        x[first..first + GROUP].copy_from_slice(&z);
+        for i in first + GROUP..d {
+            x[i] = x[i].minus(z[0], c[0][i]).minus(z[1], c[1][i]).minus(z[2], c[2][i]).minus(z[3], c[3][i]);
+        }
+    }
+    sum
+}
+
+/// x := **L**⁻ᵀx: after [`forward`], the solution of (H + μ**I**)x = b.
+#[inline(always)]
+pub fn back<T: Number>(f: &[T], d: usize, x: &mut [T]) {
+    for first in (0..d).step_by(GROUP).rev() {
+        let l: [&[T]; GROUP] = std::array::from_fn(|i| &f[(first + i) * d..][..first + GROUP]);
+        let (above, rest) = x.split_at_mut(first);
+        let z = &mut rest[..GROUP];
+        for i in (0..GROUP).rev() {
+            for j in 0..i {
+                z[j] = z[j].minus(l[i][first + j], z[i]);
+            }
+        }
+        for j in 0..first {
+            above[j] = above[j].minus(l[3][j], z[3]).minus(l[2][j], z[2]).minus(l[1][j], z[1]).minus(l[0][j], z[0]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesis::newton::Variable;
+
+    fn layout(d: usize) -> Layout<f64> {
+        let variables: Vec<Variable> = (0..d).map(|entry| Variable { entry, own: 0, relative: false }).collect();
+        let mut layout = Layout::default();
+        layout.begin(d, 1);
+        layout.place(0, &variables);
+        layout.list();
+        layout
+    }
+
+    /// The packed lower triangle of a matrix, filled up with empty rows.
+    fn lower(d: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+        let full = d.next_multiple_of(GROUP);
+        (0..full)
+            .flat_map(|i| (0..=i).map(move |j| (i, j)))
+            .map(|(i, j)| if i < d { entry(i, j) } else { 0.0 })
+            .collect()
+    }
+
+    fn means() -> Vec<Means> {
+        let alone = Width::all().into_iter().map(|width| Means { library: false, width });
+        alone.chain([Means { library: true, width: Width::Baseline }]).collect()
+    }
+
+    #[test]
+    fn every_width_gives_the_same_factor() {
+        for used in [1, 4, 7, 9, 12, 31, 58] {
+            let (h, layout) =
+                (lower(used, |i, j| ((i * 7 + j * 3) as f64).sin() + if i == j { 40.0 } else { 0.0 }), layout(used));
+            let factors = Width::all().into_iter().map(|width| {
+                let mut f = vec![0.0; layout.len() * layout.len()];
+                let answer = factorise(&h, 0.125, &layout, Means { library: false, width }, &mut f);
+                (answer, f)
+            });
+            let factors: Vec<_> = factors.collect();
+            assert!(factors.iter().all(|found| *found == factors[0]), "{used}");
+        }
+    }
+
+    #[test]
+    fn both_factorisations_solve_the_same_system() {
+        for (d, damping) in
+            [1, 2, 5, 12, 95, 128, LIBRARY_SIZE, LIBRARY_SIZE + 2].into_iter().flat_map(|d| [(d, 0.25), (d, 0.0)])
+        {
+            let entry = |i: usize, j: usize| 1.0 / (1.0 + (i - j) as f64) + if i == j { 2.0 } else { 0.0 };
+            let damped = |i: usize, j: usize| entry(i.max(j), i.min(j)) + if i == j { damping } else { 0.0 };
+            let (h, layout) = (lower(d, entry), layout(d));
+            let full = layout.len();
+            let mut b: Vec<f64> = (0..d).map(|i| (i as f64 + 1.0).sin()).collect();
+            b.resize(full, 0.0);
+            for means in means() {
+                let (mut f, mut x) = (vec![f64::NAN; full * full], b.clone());
+                assert!(factorise(&h, damping, &layout, means, &mut f).0);
+                let form = forward(&f, full, &mut x);
+                back(&f, full, &mut x);
+                for i in 0..d {
+                    let sum: f64 = (0..d).map(|j| damped(i, j) * x[j]).sum();
+                    assert!((sum - b[i]).abs() < 1e-13 * d as f64, "{d} {i}");
+                }
+                let product: f64 = b.iter().zip(&x).map(|(b, x)| b * x).sum();
+                assert!((form - product).abs() < 1e-13 * d as f64, "{d}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        for (d, means) in
+            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
+        {
+            for second in [2.0, 1.0] {
+                // Two pairs of rows, each with a pivot of 1 − x²; the first counts.
+                let h = lower(d, |i, j| match (i, j) {
+                    (1, 0) => second,
+                    (3, 2) => 3.0,
+                    _ => f64::from(u8::from(i == j)),
+                });
+                let layout = layout(d);
+                let mut f = vec![0.0; layout.len() * layout.len()];
+                let (definite, lack) = factorise(&h, 0.0, &layout, means, &mut f);
+                assert!(!definite, "{d} {second}");
+                assert!(means.library && d >= LIBRARY_SIZE || lack == second * second - 1.0, "{d} {lack}");
+            }
+        }
+    }
+
+    #[test]
+    fn damping_lifts_a_negative_matrix() {
+        for (d, means) in
+            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
+        {
+            let (h, layout) = (lower(d, |i, j| if i == j { -0.5 } else { 0.0 }), layout(d));
+            let mut f = vec![0.0; layout.len() * layout.len()];
+            assert!(!factorise(&h, 0.25, &layout, means, &mut f).0, "{d}");
+            assert!(factorise(&h, 1.0, &layout, means, &mut f).0, "{d}");
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! The unknowns of several networks side by side, and forms on the gains restricted to them.
+
+use super::variables::Variable;
+use crate::simd::Number;
+
+/// Unknowns come in groups of this size, that factorisations take at once: the last are filled up with empty ones.
+pub const GROUP: usize = 4;
+
+/// An unknown: the variable of at least one of the networks side by side, or of none.
+#[derive(Debug, Clone, Copy)]
+pub struct Slot<T: Number> {
+    /// Position of (i, j) in the gains.
+    pub entry: usize,
+    /// Position of (i, i), subtracted where the variable is relative.
+    pub own: usize,
+    /// The lanes that have this variable.
+    active: T::Mask,
+    /// 1 in lanes in which it is relative, 0 in others.
+    pub relative: T,
+    /// Whether it is relative in any.
+    pub differs: bool,
+}
+
+/// A quadratic form on the gains, given by rows.
+pub trait Form<T: Number> {
+    /// Writes the form's product with the direction of `v`: its entries before and in the block of `v`.
+    fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]);
+}
+
+/// The variables of the networks in the lanes: an unknown that a lane does not have stays where it is.
+#[derive(Debug)]
+pub struct Layout<T: Number> {
+    slots: Vec<Slot<T>>,
+    /// The slots that are not empty in all lanes.
+    used: usize,
+    copies: usize,
+    /// By position in the gains: the lanes that have it as a variable, those in which it is relative, and its row's own.
+    seen: Vec<(u16, u16, usize)>,
+}
+
+impl<T: Number> Default for Layout<T> {
+    fn default() -> Self {
+        Self { slots: Vec::new(), used: 0, copies: 1, seen: Vec::new() }
+    }
+}
+
+/// Where row i of a packed lower triangle begins.
+#[inline(always)]
+pub fn packed(i: usize) -> usize {
+    i * (i + 1) / 2
+}
+
+impl<T: Number> Layout<T> {
+    /// Begins with empty lanes, for `copies` copies of `width` gains.
+    #[inline(always)]
+    pub fn begin(&mut self, width: usize, copies: usize) {
+        self.copies = copies;
+        self.seen.clear();
+        self.seen.resize(width, (0, 0, 0));
+    }
+
+    /// Gives a lane its variables. What follows holds once the slots are [listed](Self::list).
+    #[inline(always)]
+    pub fn place(&mut self, lane: usize, variables: &[Variable]) {
+        let bit = 1u16 << lane;
+        for seen in &mut self.seen {
+            seen.0 &= !bit;
+            seen.1 &= !bit;
+        }
+        for v in variables {
+            let seen = &mut self.seen[v.entry];
+            seen.0 |= bit;
+            seen.1 |= if v.relative { bit } else { 0 };
+            seen.2 = v.own;
+        }
+    }
+
+    /// Lists the unknowns of the lanes.
+    #[inline(always)]
+    pub fn list(&mut self) {
+        self.slots.clear();
+        let (width, one, zero) = (self.seen.len(), T::splat(1.0), T::splat(0.0));
+        for copy in 0..self.copies {
+            for (entry, &(active, relative, own)) in self.seen.iter().enumerate() {
+                if active != 0 {
+                    self.slots.push(Slot {
+                        entry: copy * width + entry,
+                        own: copy * width + own,
+                        active: T::mask(active),
+                        relative: T::select(T::mask(relative), one, zero),
+                        differs: relative != 0,
+                    });
+                }
+            }
+        }
+        self.used = self.slots.len();
+        let empty = Slot { entry: 0, own: 0, active: T::mask(0), relative: zero, differs: false };
+        self.slots.resize(self.used.next_multiple_of(GROUP), empty);
+    }
+
+    /// The unknowns, empty ones included.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// The unknowns that are not empty in all lanes: the first ones.
+    #[inline(always)]
+    pub fn used(&self) -> usize {
+        self.used
+    }
+
+    /// The lanes that have an unknown.
+    #[inline(always)]
+    pub fn active(&self, slot: usize) -> T::Mask {
+        self.slots[slot].active
+    }
+
+    /// The largest diagonal entry of a restricted form.
+    #[inline(always)]
+    pub fn largest(&self, form: &[T]) -> T {
+        let mut largest = T::splat(0.0);
+        for i in 0..self.used {
+            largest = largest.or_larger(form[packed(i) + i].abs());
+        }
+        largest
+    }
+
+    /// Adds Σ x_v · direction_v to the gains.
+    #[inline(always)]
+    pub fn advance(&self, g: &mut [T], x: &[T]) {
+        for (v, &x) in self.slots[..self.used].iter().zip(x) {
+            g[v.entry] = g[v.entry] + x;
+            g[v.own] = g[v.own].minus(v.relative, x);
+        }
+    }
+
+    /// Restricts a gradient with respect to the m × N gains to the variables.
+    #[inline(always)]
+    pub fn restrict(&self, full: &[T], out: &mut [T]) {
+        for (v, out) in self.slots.iter().zip(out) {
+            *out = T::select(v.active, full[v.entry].minus(v.relative, full[v.own]), T::splat(0.0));
+        }
+    }
+
+    /// Restricts a quadratic form on the gains to the variables: the packed lower triangle of `out`. `row` holds one of
+    /// the form's.
+    #[inline(always)]
+    pub fn restrict_form(&self, form: &impl Form<T>, g: &[T], row: &mut [T], out: &mut [T]) {
+        let zero = T::splat(0.0);
+        for (a, va) in self.slots[..self.used].iter().enumerate() {
+            form.row(g, va, row);
+            for (vb, out) in self.slots[..a + 1].iter().zip(&mut out[packed(a)..packed(a + 1)]) {
+                let x = row[vb.entry].minus(vb.relative, row[vb.own]);
+                *out = if T::LANES > 1 { T::select(va.active, T::select(vb.active, x, zero), zero) } else { x };
+            }
+        }
+        for x in &mut out[packed(self.used)..packed(self.slots.len())] {
+            *x = zero;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quadratic form by its matrix.
+    struct Matrix(Vec<Vec<f64>>);
+
+    impl Form<f64> for Matrix {
+        fn row(&self, _: &[f64], v: &Slot<f64>, out: &mut [f64]) {
+            for (b, out) in out.iter_mut().enumerate() {
+                *out = self.0[v.entry][b] - v.relative * self.0[v.own][b];
+            }
+        }
+    }
+
+    /// Vectors, forms and steps on the variables of two copies of 2 × 3 gains, against the directions as columns.
+    #[test]
+    fn variables_are_directions() {
+        let own = |entry: usize| entry / 3 * 3 + entry / 3;
+        let variable = |(entry, relative)| Variable { entry, own: own(entry), relative };
+        let former: Vec<Variable> = [(0, false), (2, true), (5, true)].map(variable).to_vec();
+        let now: Vec<Variable> = [(1, true), (3, false), (4, false), (5, false)].map(variable).to_vec();
+        let mut layout = Layout::default();
+        layout.begin(6, 2);
+        layout.place(0, &former);
+        layout.place(0, &now[..3]);
+        layout.list();
+        assert_eq!((layout.used(), layout.len()), (6, 8));
+        layout.place(0, &now);
+        layout.list();
+        assert_eq!((layout.used(), layout.len()), (8, 8));
+        layout.place(0, &now[..3]);
+        layout.list();
+        let directions: Vec<Vec<f64>> = [0, 6]
+            .into_iter()
+            .flat_map(|copy| {
+                now[..3].iter().map(move |v| {
+                    let mut direction = vec![0.0; 12];
+                    direction[copy + v.entry] = 1.0;
+                    if v.relative {
+                        direction[copy + v.own] = -1.0;
+                    }
+                    direction
+                })
+            })
+            .collect();
+        let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        // Small integers: every sum is exact.
+        let slope: Vec<f64> = (0..12).map(|e| f64::from(e * e % 7 - 3)).collect();
+        let form = Matrix((0..12).map(|a| (0..12).map(|b| f64::from((a * b + a + b) % 11 - 5)).collect()).collect());
+
+        let mut restricted = vec![f64::NAN; 8];
+        layout.restrict(&slope, &mut restricted);
+        let mut expected: Vec<f64> = directions.iter().map(|v| product(v, &slope)).collect();
+        expected.resize(8, 0.0);
+        assert_eq!(restricted, expected);
+
+        let step: Vec<f64> = (1..9).map(f64::from).collect();
+        let mut moved = slope.clone();
+        layout.advance(&mut moved, &step);
+        let by = |e: usize| -> f64 { directions.iter().zip(&step).map(|(v, x)| v[e] * x).sum() };
+        assert_eq!(moved, (0..12).map(|e| slope[e] + by(e)).collect::<Vec<f64>>());
+
+        let mut lower = vec![f64::NAN; packed(8)];
+        layout.restrict_form(&form, &slope, &mut [0.0; 12], &mut lower);
+        let entry = |a: usize, b: usize| -> f64 {
+            (0..12).map(|e| directions[a][e] * product(&form.0[e], &directions[b])).sum()
+        };
+        let mut rows = lower.iter();
+        for a in 0..8 {
+            for b in 0..=a {
+                assert_eq!(rows.next(), Some(&if a < 6 { entry(a, b) } else { 0.0 }), "{a} {b}");
+            }
+        }
+        assert_eq!(layout.largest(&lower), (0..6).map(|a| entry(a, a).abs()).fold(0.0, f64::max));
+    }
+}

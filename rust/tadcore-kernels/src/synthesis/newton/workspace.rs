@@ -1,0 +1,72 @@
+//! Scratch that is reused from solve to solve.
+
+use super::layout::{GROUP, Layout, packed};
+use crate::simd::Number;
+
+/// The memory of descents side by side.
+#[derive(Debug)]
+pub struct Workspace<T: Number> {
+    /// The variables of the lanes.
+    pub layout: Layout<T>,
+    /// The points.
+    pub g: Vec<T>,
+    /// The gradients there, with respect to all gains.
+    pub slope: Vec<T>,
+    /// The points tried.
+    pub trial: Vec<T>,
+    /// The gradients there.
+    pub trial_slope: Vec<T>,
+    /// The best points known.
+    pub rival: Vec<T>,
+    /// A row of a form on all gains, the form restricted to the variables, and its factor.
+    pub row: Vec<T>,
+    pub hessian: Vec<T>,
+    pub factor: Vec<T>,
+    /// The gradient with respect to the variables, the step, and a vector to spare.
+    pub gradient: Vec<T>,
+    pub step: Vec<T>,
+    pub other: Vec<T>,
+}
+
+impl<T: Number> Default for Workspace<T> {
+    fn default() -> Self {
+        let empty = Vec::new;
+        Self {
+            layout: Layout::default(),
+            g: empty(),
+            slope: empty(),
+            trial: empty(),
+            trial_slope: empty(),
+            rival: empty(),
+            row: empty(),
+            hessian: empty(),
+            factor: empty(),
+            gradient: empty(),
+            step: empty(),
+            other: empty(),
+        }
+    }
+}
+
+impl<T: Number> Workspace<T> {
+    /// Makes room for gains of `width` entries.
+    #[inline(always)]
+    pub fn grow(&mut self, width: usize) {
+        let unknowns = width.next_multiple_of(GROUP);
+        let room = |numbers: &mut Vec<T>, len| {
+            if numbers.len() < len {
+                numbers.resize(len, T::splat(0.0));
+            }
+        };
+        for vector in
+            [&mut self.g, &mut self.slope, &mut self.trial, &mut self.trial_slope, &mut self.rival, &mut self.row]
+        {
+            room(vector, width);
+        }
+        for vector in [&mut self.gradient, &mut self.step, &mut self.other] {
+            room(vector, unknowns);
+        }
+        room(&mut self.hessian, packed(unknowns));
+        room(&mut self.factor, unknowns * unknowns);
+    }
+}

@@ -1,0 +1,251 @@
+//! Runs a list of descents as wide as the processor and the list allow: one at a time, or four to sixteen side by side, in
+//! double or in single precision.
+//!
+//! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
+//! leave the first cache side by side, and go one at a time.
+
+use std::any::Any;
+
+use crate::simd::{Number, Width, dispatch, widened};
+use crate::synthesis::newton::{Limits, Means, Objective, Owner, Tasks, Workspace, factorise, minimise};
+use crate::synthesis::theta::{Certificate, Doubled, Parts, Precisions, RealGains};
+
+/// N up to which there is a version with constant loop bounds.
+pub const CONSTANT_UP_TO: usize = 8;
+/// N up to which descents go side by side.
+pub const SIDE_BY_SIDE_UP_TO: usize = 6;
+/// Descents from which they go side by side.
+const SIDE_BY_SIDE_FROM: usize = 2;
+/// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
+const CERTIFICATE_ROUNDING: f64 = 1e-12;
+
+/// In which gains a list descends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// In the gains themselves.
+    Real,
+    /// In the gains themselves; each end point is then tried for the certificate.
+    Certified,
+    /// In the gains themselves, in single precision where the problem has it.
+    Scout,
+    /// In twice as many, complex or stacked; in single precision where the problem has it.
+    Doubled,
+}
+
+/// Runs lists at one width.
+#[derive(Debug)]
+pub struct Engine {
+    width: Width,
+    scratch: Scratch,
+}
+
+impl Default for Engine {
+    fn default() -> Self {
+        Self::of(Width::in_use())
+    }
+}
+
+/// Scratch memory for each kind of number in use, made when it is first asked for.
+#[derive(Debug, Default)]
+struct Scratch(Vec<Box<dyn Any + Send>>);
+
+impl Scratch {
+    fn of<T: Number>(&mut self) -> &mut Workspace<T> {
+        let at = self.0.iter().position(|held| held.is::<Workspace<T>>()).unwrap_or_else(|| {
+            self.0.push(Box::<Workspace<T>>::default());
+            self.0.len() - 1
+        });
+        self.0[at].downcast_mut().unwrap_or_else(|| unreachable!("found by its type"))
+    }
+}
+
+/// What a list needs besides its numbers.
+struct List<'a> {
+    kind: Kind,
+    tasks: &'a mut Tasks,
+    owners: &'a [Owner<'a>],
+    limits: Limits,
+    means: Means,
+}
+
+impl Engine {
+    /// An engine of a width that the processor has.
+    pub fn of(width: Width) -> Self {
+        Self { width, scratch: Scratch::default() }
+    }
+
+    /// Makes the descents of `tasks`.
+    // Inlined, it would have every version compiled once more where it is called.
+    #[inline(never)]
+    pub fn run(&mut self, kind: Kind, problem: &Precisions, tasks: &mut Tasks, owners: &[Owner], limits: Limits) {
+        match problem.double.size {
+            2 => self.run_sized::<2>(kind, problem, tasks, owners, limits),
+            3 => self.run_sized::<3>(kind, problem, tasks, owners, limits),
+            4 => self.run_sized::<4>(kind, problem, tasks, owners, limits),
+            5 => self.run_sized::<5>(kind, problem, tasks, owners, limits),
+            6 => self.run_sized::<6>(kind, problem, tasks, owners, limits),
+            7 => self.run_sized::<7>(kind, problem, tasks, owners, limits),
+            8 => self.run_sized::<8>(kind, problem, tasks, owners, limits),
+            _ => self.run_sized::<0>(kind, problem, tasks, owners, limits),
+        }
+    }
+
+    /// The same by the version for N, or by the one for any size where N is 0.
+    pub fn run_sized<const N: usize>(
+        &mut self,
+        kind: Kind,
+        problem: &Precisions,
+        tasks: &mut Tasks,
+        owners: &[Owner],
+        limits: Limits,
+    ) {
+        let means = Means { library: problem.double.size > CONSTANT_UP_TO, width: self.width };
+        let mut list = List { kind, tasks, owners, limits, means };
+        let (width, scratch) = (self.width, &mut self.scratch);
+        let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
+        let single = problem.single.as_ref().filter(|_| side_by_side(N));
+        match (kind, single) {
+            (Kind::Scout | Kind::Doubled, Some(parts)) => {
+                if const { side_by_side(N) } && several {
+                    return several_single::<N>(width, parts, &mut list, scratch);
+                }
+                one_single(width, parts, &mut list, scratch);
+            }
+            _ => {
+                if const { side_by_side(N) } && several && kind != Kind::Doubled {
+                    return several_double::<N>(width, &problem.double, &mut list, scratch);
+                }
+                // Doubled gains only where single precision cannot hold the problem: one version for all small sizes.
+                if const { side_by_side(N) } && kind == Kind::Doubled {
+                    return one_double::<0>(width, &problem.double, &mut list, scratch);
+                }
+                one_double::<N>(width, &problem.double, &mut list, scratch);
+            }
+        }
+    }
+}
+
+/// Whether games of this size go side by side.
+const fn side_by_side(n: usize) -> bool {
+    0 < n && n <= SIDE_BY_SIDE_UP_TO
+}
+
+/// Whether descents are made in single precision: where they go side by side, twice as many fit a register.
+#[must_use]
+pub fn single(problem: &Precisions) -> bool {
+    problem.single.is_some() && side_by_side(problem.double.size)
+}
+
+// Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+
+dispatch! {
+    /// As many descents side by side as a register holds.
+    fn several_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+        if const { V::SIZED } {
+            descend::<V::Double, N>(parts, list, scratch.of());
+        } else {
+            any_size::<f64>(parts, list, scratch.of());
+        }
+    }
+}
+
+dispatch! {
+    /// The same in single precision.
+    fn several_single<V, const N: usize>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+        if const { !V::SIZED } {
+            any_size::<f32>(parts, list, scratch.of());
+        } else if list.kind == Kind::Doubled {
+            descend_doubled::<V::Half, N>(parts, list, scratch.of());
+        } else {
+            descend::<V::Single, N>(parts, list, scratch.of());
+        }
+    }
+}
+
+widened! {
+    /// One descent after another.
+    fn one_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+        if const { !V::SIZED } {
+            any_size::<f64>(parts, list, scratch.of());
+        } else if const { side_by_side(N) } || list.kind != Kind::Doubled {
+            descend::<f64, N>(parts, list, scratch.of());
+        } else {
+            descend_doubled::<f64, N>(parts, list, scratch.of());
+        }
+    }
+}
+
+widened! {
+    /// The same in single precision: seldom enough for one version for all sizes.
+    fn one_single<V>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+        if const { V::SIZED } {
+            run::<f32, 0>(parts, list, scratch.of());
+        } else {
+            any_size::<f32>(parts, list, scratch.of());
+        }
+    }
+}
+
+#[inline(never)]
+fn any_size<T: Number>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    run::<T, 0>(parts, list, w);
+}
+
+#[inline(always)]
+fn run<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    match list.kind {
+        Kind::Doubled => descend_doubled::<T, N>(parts, list, w),
+        _ => descend::<T, N>(parts, list, w),
+    }
+}
+
+#[inline(always)]
+fn descend_doubled<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    minimise(&mut Doubled::<T, N>::new(parts), list.tasks, list.owners, list.limits, list.means, w);
+}
+
+#[inline(always)]
+fn descend<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    let mut real = RealGains::<T, N>::new(parts);
+    minimise(&mut real, list.tasks, list.owners, list.limits, list.means, w);
+    if !T::SINGLE && list.kind == Kind::Certified {
+        certify(&mut real, list.tasks, list.owners, list.means, w);
+    }
+}
+
+/// Tries every end point for the certificate that proves a critical point to be a global minimiser.
+#[inline(always)]
+fn certify<T: Number, const N: usize>(
+    real: &mut RealGains<T, N>,
+    tasks: &mut Tasks,
+    owners: &[Owner],
+    means: Means,
+    w: &mut Workspace<T>,
+) {
+    let width = real.width();
+    let mut first = 0;
+    while first < tasks.len() {
+        let last = tasks.len().min(first + T::LANES);
+        w.layout.begin(tasks.width(), 1);
+        for task in first..last {
+            let lane = task - first;
+            w.layout.place(lane, owners[tasks.owner(task)].variables);
+            for (g, &x) in w.g.iter_mut().zip(tasks.point(task)) {
+                g.set_lane(lane, x);
+            }
+        }
+        w.layout.list();
+        real.value(&w.g[..width]);
+        w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian);
+        let largest = w.layout.largest(&w.hessian);
+        let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
+        let (definite, _) = factorise(&w.hessian, allowance, &w.layout, means, &mut w.factor);
+        let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
+        for task in first..last {
+            if proved >> (task - first) & 1 == 1 {
+                tasks.certify(task);
+            }
+        }
+        first = last;
+    }
+}

@@ -1,0 +1,3 @@
+//! Lists of descents, made as wide as the processor allows.
+
+pub mod dispatch;

@@ -1,0 +1,9 @@
+//! Θ over the gains.
+
+mod coefficients;
+mod doubled;
+mod real;
+
+pub use coefficients::{Parts, Precisions, Scale};
+pub use doubled::Doubled;
+pub use real::{Certificate, RealGains};

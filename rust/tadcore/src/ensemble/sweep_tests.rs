@@ -1,0 +1,100 @@
+//! Sweeps against the version for any size, and rims that belong to their balls.
+
+use tadcore_kernels::ensemble::anysize::{observe_any, sweep_any};
+use tadcore_kernels::ensemble::strip::{LANES, Lane, Shape, Stop, Strips};
+use tadcore_kernels::ensemble::sweep::{observe, sweep_of};
+
+use crate::network::{self, Topology, squared_reach};
+use crate::policy::step_table::Shelf;
+use crate::simd::{Baseline, Simd, Width};
+use crate::simulation::Reach;
+
+/// Points whose distances are whole numbers, on the rims of whole radii: as one run sees and ends them.
+#[test]
+fn rims_belong_to_the_balls_at_every_size() {
+    let points =
+        [[9.0, 12.0], [18.0, 24.0], [0.0, 15.0], [15.0, 36.0], [-9.0, 12.0], [0.0, 30.0], [24.0, 45.0], [-15.0, 0.0]];
+    let radii = [15.0, 30.0, 39.0, 15.0_f64.next_down(), 9.0, 6.0, 18.0, 12.0];
+    let shape = Shape { size: 3, rows: 2, dim: 2, words: 1 };
+    for turn in 0..radii.len() {
+        let row = |lane: usize, i: usize| points[(lane + 3 * i) % points.len()];
+        let radius = |lane: usize, i: usize| squared_reach(radii[(lane + i + turn) % radii.len()]);
+        let z: Vec<Lane> = (0..6).map(|e| std::array::from_fn(|l| row(l, e / 2)[e % 2])).collect();
+        let sight: Vec<Lane> = (0..2).map(|i| std::array::from_fn(|l| radius(l, i))).collect();
+        let capture: Vec<Lane> = (0..3).map(|i| std::array::from_fn(|l| radius(l, i + 2))).collect();
+        let mut keys = vec![[0; LANES]];
+        let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
+        let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture);
+        assert_eq!((keys[0], caught), (Baseline::keys(compiled), u32::from(ends)));
+        // With nothing on the shelf a sweep stops with what it saw, or with whom it caught.
+        let nothing = [-1.0; LANES];
+        for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
+            let expected = if caught == 0 { Stop::Missing(0) } else { Stop::Caught(0, caught) };
+            for width in Width::all() {
+                let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
+                let mut strips = Strips { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
+                let mut seen = vec![[0; LANES]];
+                let stop = sweep_of(&shape)(width, &shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
+                assert_eq!(stop, expected, "{width:?}");
+                assert!(caught != 0 || seen == keys, "{width:?}");
+            }
+        }
+        for l in 0..LANES {
+            let state: Vec<f64> = z.iter().map(|lane| lane[l]).collect();
+            let mut topology = Topology::empty(2, 3);
+            network::observe(&state, 2, &[sight[0][l], sight[1][l]], &mut topology);
+            assert_eq!(topology.key(), Some(keys[0][l]));
+            let reach = Reach::new(&[2, 3, 4].map(|i| radii[(l + i + turn) % radii.len()]));
+            assert_eq!(reach.ends(&state, 2).is_some(), caught >> l & 1 == 1);
+        }
+    }
+}
+
+/// Stops, keys and states are those of the version that takes one strip after another, at every width.
+#[test]
+fn blocks_stop_where_single_strips_do() {
+    let shape = Shape { size: 4, rows: 3, dim: 2, words: 1 };
+    // In (−1, 1), without a pattern.
+    let wave = |i: usize| ((12.9898 * i as f64 + 4.1).sin() * 43758.5453).fract();
+    let mut shelf = Shelf::new(3, 4);
+    for key in (0..1 << 12).filter(|key| key % 41 != 3) {
+        let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
+        shelf.insert(&[key as u64], None, &matrix);
+    }
+    let strips = || Strips {
+        z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
+        sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
+        capture: vec![[0.04; LANES]; 4],
+        sight_step: 0,
+        capture_step: 0,
+        live: 40 * LANES - 3,
+    };
+    for width in Width::all() {
+        let (mut ours, mut single) = (strips(), strips());
+        let (mut keys, mut expected) = (vec![[0; LANES]], vec![[0; LANES]]);
+        let (mut from, mut counts) = (0, [0; 2]);
+        loop {
+            let stop = sweep_of(&shape)(width, &shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
+            assert_eq!(stop, sweep_any(width, &shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
+            assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
+            match stop {
+                Stop::End => break,
+                Stop::Caught(strip, _) => {
+                    // All eight a long way off, where nobody sees or catches anybody.
+                    for all in [&mut ours, &mut single] {
+                        all.z[8 * strip..][..8]
+                            .iter_mut()
+                            .enumerate()
+                            .for_each(|(e, z)| *z = [10.0 * (1 + e) as f64; 8]);
+                    }
+                    (from, counts[0]) = (strip, counts[0] + 1);
+                }
+                Stop::Missing(strip) => {
+                    assert_eq!(keys, expected);
+                    (from, counts[1]) = (strip + 1, counts[1] + 1);
+                }
+            }
+        }
+        assert!(counts.iter().all(|&count| count > 3 && count < 30), "{counts:?}");
+    }
+}
