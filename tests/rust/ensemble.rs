@@ -284,7 +284,7 @@ fn the_environment_chooses_a_width_or_is_refused() {
         let output = std::process::Command::new(program).args(test).env("TADCORE_SIMD", value).output();
         let text = String::from_utf8(output.expect("a process").stdout).expect("UTF-8");
         let line = text.lines().find_map(|line| line.split_once("used: ").or_else(|| line.split_once("refused: ")));
-        line.unwrap_or_else(|| panic!("{text}")).1.to_owned()
+        line.expect("a line that begins with what was used").1.to_owned()
     };
     let refused = told("sse2");
     let (said, widths) = refused.split_once("; this processor has ").expect("the widths of the processor");
