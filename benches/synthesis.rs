@@ -1,7 +1,7 @@
 //! One synthesis: min Θ₁ at mid-game under random networks of density ½, n = 3, 5, 10, 20.
 //!
 //! `canonical` cycles through networks whose first descent is certified (Newton alone and the certificate);
-//! `any` cycles through all networks drawn, further looks included.
+//! `any` cycles through all networks drawn, restarts included.
 
 use std::hint::black_box;
 

@@ -123,8 +123,8 @@ class Gains:
     def certified(self) -> bool: ...
     """Whether the minimum is proved to be global."""
     @property
-    def look(self) -> Literal["canonical", "complex", "stacked", "reversed"]: ...
-    """The look that found the minimum."""
+    def start(self) -> Literal["canonical", "complex", "stacked", "reversed"]: ...
+    """The start that led to the minimum."""
 
 @final
 class Record:

@@ -1,11 +1,11 @@
 """The mutants of steps, networks, runs, costs and batches; `listed.py` says how to read a row."""
 
 MUTANTS = {
-    "policy/relabelling.rs": [
-        ("rows of a model", "out[«order[i] * n + order[j]»]", "order[j] * n + order[i]"),
+    "policy/symmetry.rs": [
+        ("rows of a canonical form", "out[«order[i] * n + order[j]»]", "order[j] * n + order[i]"),
         ("who is alike", ".find(|&j| «same(i, j)»)", "!same(i, j)"),
         ("seen by whom", "wrapping_add(mix(«!players[i].colour»))", "players[i].colour"),
-        ("places of a kind", "order[at] = «i»;", "at"),
+        ("places of a class", "order[at] = «i»;", "at"),
     ],
     "policy/filler.rs": [
         ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),
@@ -78,11 +78,11 @@ MUTANTS = {
     "ensemble/chunk.rs": [
         ("batches: z = X − X_a", "«x - attacker[e % dim]»", "x + attacker[e % dim]"),
     ],
-    "ensemble/strip.rs": [
-        ("batches: places that play", "«live - strip * LANES»", "live + strip * LANES"),
+    "ensemble/block.rs": [
+        ("batches: places that play", "«live - block * LANES»", "live + block * LANES"),
         ("batches: lanes that play", "=> «(1 << count) - 1»,", "(1 << count) | 1"),
         ("batches: lane of a copy", "[«from % LANES»]", "to % LANES"),
-        ("batches: strip of a copy", "lanes[«from / LANES * step + e»]", "to / LANES * step + e"),
+        ("batches: block of a copy", "lanes[«from / LANES * step + e»]", "to / LANES * step + e"),
     ],
     "ensemble/sweep.rs": [
         (
@@ -120,8 +120,8 @@ MUTANTS = {
         ("batches: lane of a half", "let lane = «4 * half + l»;", "l"),
         ("batches: rows as columns", "«V::transpose(next[x][q])»", "next[x][q]"),
         ("batches: row of a result", "z[(«4 * q + r») * D + x]", "r"),
-        ("batches: caught among who play", "«u32::from(caught) & playing(strips.live, strip)»", "u32::from(caught)"),
-        ("batches: strip that moves", "strips.z[«first * N * D»..]", "0"),
+        ("batches: caught among who play", "«u32::from(caught) & playing(blocks.live, block)»", "u32::from(caught)"),
+        ("batches: block that moves", "blocks.z[«first * N * D»..]", "0"),
         ("batches: key of a half", "direct[«low[half]» as usize", "low[1 - half]"),
         ("batches: next key", "low[half] >>= «16»;", "8"),
         ("batches: a topology that is missing", "all &= «slot != 0»;", "true"),

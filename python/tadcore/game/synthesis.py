@@ -151,5 +151,5 @@ def synthesize(
         status=core.status,
         gradient_norm=core.gradient_norm,
         certified=core.certified,
-        start=core.look,
+        start=core.start,
     )

@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use tadcore::network::Topology;
-use tadcore::synthesis::{Gains as CoreGains, Look, Status};
+use tadcore::synthesis::{Gains as CoreGains, Start, Status};
 
 use super::arrays::shaped;
 
@@ -78,14 +78,14 @@ impl Gains {
         self.gains.certified
     }
 
-    /// The look that found the minimum: canonical, complex, stacked or reversed.
+    /// The start that led to the minimum: canonical, complex, stacked or reversed.
     #[getter]
-    fn look(&self) -> &'static str {
-        match self.gains.look {
-            Look::Canonical => "canonical",
-            Look::Complex => "complex",
-            Look::Stacked => "stacked",
-            Look::Reversed => "reversed",
+    fn start(&self) -> &'static str {
+        match self.gains.start {
+            Start::Canonical => "canonical",
+            Start::Complex => "complex",
+            Start::Stacked => "stacked",
+            Start::Reversed => "reversed",
         }
     }
 }

@@ -1,43 +1,43 @@
 //! A sweep for sizes known only at run time, trial after trial.
 
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, playing};
-use crate::policy::step_table::{Shelf, padded};
+use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, playing};
+use crate::policy::step_table::{StepTable, padded};
 use crate::simd::Width;
 
-/// One step of the strips from one on; a [`Sweep`](super::strip::Sweep) that does not look ahead.
+/// One step of the blocks from one on; a [`Sweep`](super::block::Sweep) that does not look ahead.
 pub fn sweep_any(
     _: Width,
     shape: &Shape,
-    strips: &mut Strips,
+    blocks: &mut Blocks,
     from: usize,
-    shelf: &Shelf,
-    _: Option<&Shelf>,
+    table: &StepTable,
+    _: Option<&StepTable>,
     keys: &mut Keys,
 ) -> Stop {
     let (n, d) = (shape.size, shape.dim);
     let stride = n * padded(n);
     let (mut state, mut words) = (vec![0.0; n * d], vec![0; shape.words]);
     let mut next = vec![0.0; padded(n)];
-    for strip in from..strips.live.div_ceil(LANES) {
-        let playing = playing(strips.live, strip);
-        let z = &mut strips.z[strip * n * d..][..n * d];
-        let sight = &strips.sight[strip * strips.sight_step..][..shape.rows];
-        let capture = &strips.capture[strip * strips.capture_step..][..n];
+    for block in from..blocks.live.div_ceil(LANES) {
+        let playing = playing(blocks.live, block);
+        let z = &mut blocks.z[block * n * d..][..n * d];
+        let sight = &blocks.sight[block * blocks.sight_step..][..shape.rows];
+        let capture = &blocks.capture[block * blocks.capture_step..][..n];
         let caught = observe_any(shape, z, sight, capture, keys) & playing;
         if caught != 0 {
-            return Stop::Caught(strip, caught);
+            return Stop::Caught(block, caught);
         }
         let mut slots = [0; LANES];
         for (l, slot) in slots.iter_mut().enumerate() {
             words.iter_mut().zip(&*keys).for_each(|(word, lanes)| *word = lanes[l]);
-            *slot = shelf.find(&words) as usize;
+            *slot = table.find(&words) as usize;
         }
         if slots.contains(&0) {
-            return Stop::Missing(strip);
+            return Stop::Missing(block);
         }
         for (l, slot) in slots.into_iter().enumerate() {
             state.iter_mut().zip(&*z).for_each(|(x, lane)| *x = lane[l]);
-            let t = &shelf.matrices()[slot * stride..][..stride];
+            let t = &table.matrices()[slot * stride..][..stride];
             for x in 0..d {
                 next.fill(0.0);
                 for (j, column) in t.chunks_exact(padded(n)).enumerate() {
@@ -55,7 +55,7 @@ pub fn sweep_any(
     Stop::End
 }
 
-/// The keys of one strip, and a bit for each trial in which somebody is caught.
+/// The keys of one block, and a bit for each trial in which somebody is caught.
 pub fn observe_any(shape: &Shape, z: &[Lane], sight: &[Lane], capture: &[Lane], keys: &mut Keys) -> u32 {
     let (n, m, d) = (shape.size, shape.rows, shape.dim);
     keys.fill([0; LANES]);

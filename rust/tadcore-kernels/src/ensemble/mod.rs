@@ -1,5 +1,5 @@
 //! Steps of eight trials at a time.
 
 pub mod anysize;
-pub mod strip;
+pub mod block;
 pub mod sweep;

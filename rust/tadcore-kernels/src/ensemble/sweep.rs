@@ -3,21 +3,21 @@
 //! Every sum runs in the order of a run that is recorded and no product is fused with a sum, so that a trial
 //! ends as it would alone, to the bit, at every [`Width`].
 //!
-//! Memory is what a step waits for, so nothing is asked for when it is needed: a block of strips is looked at before any
-//! of them moves, which puts independent work between a lookup and the product that needs it, and every block fetches a
-//! part of the next instant's shelf.
+//! Memory is what a step waits for, so nothing is asked for when it is needed: the blocks of a run are read before any
+//! of them moves, which puts independent work between a lookup and the product that needs it, and every run fetches a
+//! part of the next instant's table.
 
 use super::anysize::sweep_any;
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep, playing};
+use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep, playing};
 use crate::policy::index::DIRECT_BITS;
-use crate::policy::step_table::Shelf;
+use crate::policy::step_table::StepTable;
 use crate::simd::{Number, Simd, Width, dispatch};
 
-/// Strips that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
+/// Blocks that are looked at before any of them moves: their states, 8 KiB for four rows in the plane, stay in the first
 /// cache in between.
-const BLOCK: usize = 16;
+const AHEAD: usize = 16;
 
-/// Lines of the next instant's shelf that a strip fetches at most: few strips need few entries.
+/// Lines of the next instant's table that a block fetches at most: few blocks need few entries.
 const MOST_LINES: usize = 8;
 
 /// An index that knows no topology.
@@ -62,7 +62,7 @@ fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight
     sum
 }
 
-/// The keys of one strip, and a bit for each trial in which somebody is caught.
+/// The keys of one block, and a bit for each trial in which somebody is caught.
 #[inline(always)]
 pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
     z: &[Lane],
@@ -88,7 +88,7 @@ pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
     (keys, caught)
 }
 
-/// z ← exp(Cδ) z for one strip whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
+/// z ← exp(Cδ) z for one block whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
 #[inline(always)]
 fn step<V: Simd, const N: usize, const D: usize, const Q: usize, const E: usize>(
     z: &mut [Lane],
@@ -129,12 +129,12 @@ fn step<V: Simd, const N: usize, const D: usize, const Q: usize, const E: usize>
 /// Keys that are their own index are read as words of 16 bits.
 const _: () = assert!(DIRECT_BITS <= 16);
 
-/// Writes the slots of eight topologies; whether all are on the shelf.
+/// Writes the slots of eight topologies; whether all are in the table.
 #[inline(always)]
 fn look_up<V: Simd, const N: usize, const M: usize>(
     seen: V::Keys,
     direct: &[u16],
-    shelf: &Shelf,
+    table: &StepTable,
     slots: &mut [u32; LANES],
 ) -> bool {
     let mut all = true;
@@ -151,32 +151,32 @@ fn look_up<V: Simd, const N: usize, const M: usize>(
         }
     } else {
         for (slot, key) in slots.iter_mut().zip(V::keys(seen)) {
-            *slot = shelf.find(&[key]);
+            *slot = table.find(&[key]);
             all &= *slot != 0;
         }
     }
     all
 }
 
-/// One step of the strips from one on, as far as they can move: a [`Sweep`].
+/// One step of the blocks from one on, as far as they can move: a [`Sweep`].
 #[inline(always)]
 fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
-    strips: &mut Strips,
+    blocks: &mut Blocks,
     from: usize,
-    shelf: &Shelf,
-    next: Option<&Shelf>,
+    table: &StepTable,
+    next: Option<&StepTable>,
     keys: &mut Keys,
 ) -> Stop {
-    let matrices = shelf.matrices().as_chunks().0.as_chunks().0;
+    let matrices = table.matrices().as_chunks().0.as_chunks().0;
     let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
-    let direct = shelf.direct().get(..places).unwrap_or(&NOTHING[..places]);
-    let end = strips.live.div_ceil(LANES);
-    let mut slots = [[0; LANES]; BLOCK];
+    let direct = table.direct().get(..places).unwrap_or(&NOTHING[..places]);
+    let end = blocks.live.div_ceil(LANES);
+    let mut slots = [[0; LANES]; AHEAD];
     let mut first = from;
     while first < end {
-        let count = BLOCK.min(end - first);
+        let count = AHEAD.min(end - first);
         if let Some(next) = next {
-            // As many lines for each strip of a step.
+            // As many lines for each block of a step.
             let lines = next.lines();
             let share = lines.div_ceil(end).min(MOST_LINES);
             for line in first * share..((first + count) * share).min(lines) {
@@ -184,27 +184,27 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
             }
         }
         let (mut ready, mut stop) = (0, Stop::End);
-        let block = &mut strips.z[first * N * D..][..count * N * D];
-        for (z, slots) in block.chunks_exact(N * D).zip(&mut slots) {
-            let strip = first + ready;
-            let sight = &strips.sight[strip * strips.sight_step..][..M];
-            let capture = &strips.capture[strip * strips.capture_step..][..N];
+        let ahead = &mut blocks.z[first * N * D..][..count * N * D];
+        for (z, slots) in ahead.chunks_exact(N * D).zip(&mut slots) {
+            let block = first + ready;
+            let sight = &blocks.sight[block * blocks.sight_step..][..M];
+            let capture = &blocks.capture[block * blocks.capture_step..][..N];
             let (seen, caught) = observe::<V, N, M, D>(z, sight, capture);
             if caught != 0 {
-                let caught = u32::from(caught) & playing(strips.live, strip);
+                let caught = u32::from(caught) & playing(blocks.live, block);
                 if caught != 0 {
-                    stop = Stop::Caught(strip, caught);
+                    stop = Stop::Caught(block, caught);
                     break;
                 }
             }
-            if !look_up::<V, N, M>(seen, direct, shelf, slots) {
+            if !look_up::<V, N, M>(seen, direct, table, slots) {
                 keys[0] = V::keys(seen);
-                stop = Stop::Missing(strip);
+                stop = Stop::Missing(block);
                 break;
             }
             ready += 1;
         }
-        for (z, slots) in block.chunks_exact_mut(N * D).zip(&slots[..ready]) {
+        for (z, slots) in ahead.chunks_exact_mut(N * D).zip(&slots[..ready]) {
             step::<V, N, D, Q, E>(z, slots, matrices);
         }
         if stop != Stop::End {
@@ -219,17 +219,17 @@ dispatch! {
     /// A sweep compiled for its sizes.
     fn sized<V, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
         shape: &Shape,
-        strips: &mut Strips,
+        blocks: &mut Blocks,
         from: usize,
-        shelf: &Shelf,
-        next: Option<&Shelf>,
+        table: &StepTable,
+        next: Option<&StepTable>,
         keys: &mut Keys,
     ) -> Stop {
         if const { V::SIZED } {
-            sweep::<V, N, M, D, Q, E>(strips, from, shelf, next, keys)
+            sweep::<V, N, M, D, Q, E>(blocks, from, table, next, keys)
         } else {
             // Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
-            sweep_any(Width::Baseline, shape, strips, from, shelf, next, keys)
+            sweep_any(Width::Baseline, shape, blocks, from, table, next, keys)
         }
     }
 }

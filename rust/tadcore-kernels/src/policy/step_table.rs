@@ -2,10 +2,11 @@
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
-//! | exp(Cδ) | [`Shelf::matrices`] from `slot × stride` | by columns, each padded with zeros to [`padded`] rows |
+//! | exp(Cδ) | [`StepTable::matrices`] from `slot × stride` | by columns, each padded with zeros to [`padded`] rows |
 //! | 𝒜 | the words of a topology | the key |
 //!
-//! Where an entry lies is its slot ([`super::index`]). Slot 0 is never a topology's: a lookup that gives 0 found nothing.
+//! Where an entry lies is its slot ([`super::index`]). Slot 0 is never a topology's: a lookup that gives 0 found
+//! nothing.
 
 use super::index::Index;
 use crate::simd::prefetch;
@@ -25,10 +26,10 @@ pub fn padded(n: usize) -> usize {
 
 /// The transitions of one instant.
 #[derive(Debug)]
-pub struct Shelf {
+pub struct StepTable {
     index: Index,
-    /// By model: the slot of the first topology that was derived from it.
-    models: Index,
+    /// By canonical form: the slot of the first topology that has it.
+    canonical_forms: Index,
     matrices: Vec<f64>,
     keys: Vec<u64>,
     bits: usize,
@@ -37,12 +38,20 @@ pub struct Shelf {
     skip: usize,
 }
 
-impl Shelf {
-    /// An empty shelf for N = `size` and `rows` constrained players.
+impl StepTable {
+    /// An empty table for N = `size` and `rows` constrained players.
     pub fn new(rows: usize, size: usize) -> Self {
         let bits = rows * size;
-        let (index, models) = (Index::new(bits, true), Index::new(bits, false));
-        Self { index, models, matrices: Vec::new(), keys: Vec::new(), bits, stride: size * padded(size), skip: 0 }
+        let (index, canonical_forms) = (Index::new(bits, true), Index::new(bits, false));
+        Self {
+            index,
+            canonical_forms,
+            matrices: Vec::new(),
+            keys: Vec::new(),
+            bits,
+            stride: size * padded(size),
+            skip: 0,
+        }
     }
 
     /// The slot of a topology's entry, 0 where there is none.
@@ -51,12 +60,13 @@ impl Shelf {
         self.index.find(words)
     }
 
-    /// The slot of a topology with this model, 0 where there is none.
-    pub fn find_model(&self, words: &[u64]) -> u32 {
-        self.models.find(words)
+    /// The slot of a topology with this canonical form, 0 where there is none.
+    pub fn find_canonical(&self, words: &[u64]) -> u32 {
+        self.canonical_forms.find(words)
     }
 
-    /// The slots by key of a shelf with at most [`DIRECT_BITS`](super::index::DIRECT_BITS) bits, for sweeps that know their size.
+    /// The slots by key of a table with at most [`DIRECT_BITS`](super::index::DIRECT_BITS) bits, for sweeps that know
+    /// their size.
     #[inline(always)]
     pub fn direct(&self) -> &[u16] {
         match &self.index {
@@ -71,7 +81,7 @@ impl Shelf {
         &self.matrices[self.skip..]
     }
 
-    /// Cache lines that lookups read: the index of a direct shelf, then the matrices.
+    /// Cache lines that lookups read: the index of a direct table, then the matrices.
     #[inline(always)]
     pub fn lines(&self) -> usize {
         self.direct().len() / DIRECT_LINE + self.matrices().len().div_ceil(MATRIX_LINE)
@@ -107,16 +117,19 @@ impl Shelf {
         &self.matrices()[slot * self.stride..][..self.stride]
     }
 
-    /// Bytes that one more entry takes, the shelf's own memory with the first; `shared` if it may have a model.
+    /// Bytes that one more entry takes, the table's own memory with the first; `shared` if its canonical form is
+    /// listed.
     pub fn entry_bytes(&self, shared: bool) -> usize {
         let words = self.bits.div_ceil(64);
-        let models = if shared { self.models.entry_bytes(self.bits) } else { 0 };
+        let canonical_forms = if shared { self.canonical_forms.entry_bytes(self.bits) } else { 0 };
         // A vector that grows by doubling is up to half empty.
-        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words) + self.index.entry_bytes(self.bits) + models
+        2 * (size_of::<f64>() * self.stride + size_of::<u64>() * words)
+            + self.index.entry_bytes(self.bits)
+            + canonical_forms
     }
 
-    /// Adds an entry that is not there yet, and its model if it may have one.
-    pub fn insert(&mut self, words: &[u64], model: Option<&[u64]>, matrix: &[f64]) {
+    /// Adds an entry that is not there yet, and its canonical form if that is listed.
+    pub fn insert(&mut self, words: &[u64], canonical: Option<&[u64]>, matrix: &[f64]) {
         debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
         if self.matrices.capacity() < self.matrices.len() + self.stride {
             self.grow();
@@ -125,8 +138,8 @@ impl Shelf {
         self.matrices.extend_from_slice(matrix);
         self.keys.extend_from_slice(words);
         self.index.insert(words, slot, self.bits);
-        if let Some(model) = model.filter(|model| self.models.find(model) == 0) {
-            self.models.insert(model, slot, self.bits);
+        if let Some(canonical) = canonical.filter(|canonical| self.canonical_forms.find(canonical) == 0) {
+            self.canonical_forms.insert(canonical, slot, self.bits);
         }
     }
 
@@ -147,7 +160,7 @@ impl Shelf {
         self.matrices.truncate(self.skip + self.stride);
         self.keys.clear();
         self.index.clear();
-        self.models.clear();
+        self.canonical_forms.clear();
     }
 }
 
@@ -159,7 +172,7 @@ mod tests {
     #[test]
     fn every_entry_is_found_again() {
         for (rows, size) in [(3, 4), (4, 4), (4, 5), (8, 8), (8, 9), (12, 13)] {
-            let mut shelf = Shelf::new(rows, size);
+            let mut table = StepTable::new(rows, size);
             let (bits, stride) = (rows * size, size * padded(size));
             let mask = if bits >= 64 { u64::MAX } else { (1 << bits) - 1 };
             let key = |i: u64| -> Vec<u64> {
@@ -171,22 +184,22 @@ mod tests {
                 }
             };
             for i in 0..3000 {
-                assert_eq!(shelf.find(&key(i)), 0, "{rows} {size} {i}");
-                shelf.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]);
+                assert_eq!(table.find(&key(i)), 0, "{rows} {size} {i}");
+                table.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]);
             }
-            assert_eq!(shelf.len(), 3000);
+            assert_eq!(table.len(), 3000);
             for i in 0..3000 {
-                let slot = shelf.find(&key(i)) as usize;
+                let slot = table.find(&key(i)) as usize;
                 assert_eq!(slot, i as usize + 1);
-                assert!(shelf.matrix(slot).iter().all(|&x| x == i as f64));
-                assert_eq!(shelf.key(slot), key(i));
-                // Two entries each have the first as their model.
-                assert_eq!(shelf.find_model(&key(i)), if i % 2 == 0 { i as u32 + 1 } else { 0 });
+                assert!(table.matrix(slot).iter().all(|&x| x == i as f64));
+                assert_eq!(table.key(slot), key(i));
+                // Two entries each have the first as their canonical form.
+                assert_eq!(table.find_canonical(&key(i)), if i % 2 == 0 { i as u32 + 1 } else { 0 });
             }
-            assert_eq!(shelf.matrices().as_ptr().align_offset(LINE), 0);
-            assert_eq!(shelf.find(&key(3000)), 0);
-            shelf.clear();
-            assert_eq!((shelf.find(&key(5)), shelf.find_model(&key(4)), shelf.len()), (0, 0, 0));
+            assert_eq!(table.matrices().as_ptr().align_offset(LINE), 0);
+            assert_eq!(table.find(&key(3000)), 0);
+            table.clear();
+            assert_eq!((table.find(&key(5)), table.find_canonical(&key(4)), table.len()), (0, 0, 0));
         }
     }
 }

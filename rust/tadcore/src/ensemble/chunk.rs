@@ -1,11 +1,11 @@
 //! A chunk of trials in lockstep: all that still play stand at the same grid instant.
 //!
-//! At every instant the strips of the chunk move one after another. A trial that is over leaves: the last one takes its
-//! place, so the strips stay full. A strip whose topologies are not all on the shelf waits; when the others have moved,
-//! what is missing is solved and the waiting strips follow.
+//! At every instant the blocks of the chunk move one after another. A trial that is over leaves: the last one takes its
+//! place, so the blocks stay full. A block whose topologies are not all in the table waits; when the others have moved,
+//! what is missing is solved and the waiting blocks follow.
 
 use super::Batch;
-use super::strip::{Keys, LANES, Lane, Shape, Stop, Strips, Sweep};
+use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep};
 use super::sweep::sweep_of;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
@@ -13,7 +13,7 @@ use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
 use crate::policy::filler::Filler;
-use crate::policy::step_table::Shelf;
+use crate::policy::step_table::StepTable;
 use crate::simd::Width;
 use crate::simulation::{Outcome, Reach};
 
@@ -24,7 +24,7 @@ pub(super) type End = (Outcome, usize);
 #[derive(Debug)]
 pub(super) struct Worker {
     filler: Filler,
-    local: Shelf,
+    local: StepTable,
     keys: Keys,
     /// The words of one key.
     words: Vec<u64>,
@@ -37,7 +37,7 @@ impl Worker {
         let (rows, size) = (policy.game().constrained(), policy.game().size());
         Self {
             filler: Filler::default(),
-            local: Shelf::new(rows, size),
+            local: StepTable::new(rows, size),
             keys: vec![[0; LANES]; (rows * size).div_ceil(64)],
             words: Vec::new(),
             missing: Vec::new(),
@@ -54,7 +54,7 @@ pub(super) struct Chunk<'a> {
     shape: Shape,
     width: Width,
     sweep: Sweep,
-    strips: Strips,
+    blocks: Blocks,
     /// Which trial of the chunk stands in each place.
     who: Vec<u32>,
 }
@@ -64,10 +64,10 @@ impl<'a> Chunk<'a> {
     pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize, width: Width) -> Self {
         let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
         let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
-        let strips = trials.div_ceil(LANES);
-        let mut z = vec![[0.0; LANES]; strips * size * dim];
-        for place in 0..strips * LANES {
-            // Places past the last trial repeat the first of their strip, so that they ask for nothing new.
+        let blocks = trials.div_ceil(LANES);
+        let mut z = vec![[0.0; LANES]; blocks * size * dim];
+        for place in 0..blocks * LANES {
+            // Places past the last trial repeat the first of their block, so that they ask for nothing new.
             let trial = if place < trials { place } else { place / LANES * LANES };
             let row = batch.position(first + trial, size + 1);
             let (players, attacker) = row.split_at(size * dim);
@@ -79,8 +79,8 @@ impl<'a> Chunk<'a> {
         let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who = (0..trials as u32).collect();
-        let strips = Strips { z, sight, capture, sight_step, capture_step, live: trials };
-        Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), strips, who }
+        let blocks = Blocks { z, sight, capture, sight_step, capture_step, live: trials };
+        Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), blocks, who }
     }
 
     /// Plays every trial to its end.
@@ -92,10 +92,10 @@ impl<'a> Chunk<'a> {
             cancel.check()?;
             w.missing.clear();
             w.waiting.clear();
-            let next = (k + 1 < last).then(|| transitions.shelf(k + 1));
-            self.pass(k, &transitions.shelf(k), next.as_deref(), ends, w);
+            let next = (k + 1 < last).then(|| transitions.step_table(k + 1));
+            self.pass(k, &transitions.step_table(k), next.as_deref(), ends, w);
             drop(next);
-            lookups += self.strips.live as u64;
+            lookups += self.blocks.live as u64;
             if !w.waiting.is_empty() {
                 w.missing.sort_unstable();
                 w.missing.dedup();
@@ -103,7 +103,7 @@ impl<'a> Chunk<'a> {
                 misses += w.filler.fill(self.policy, k, &w.missing, &mut w.local, cancel)?;
                 self.follow(k, w);
             }
-            if self.strips.live == 0 {
+            if self.blocks.live == 0 {
                 break;
             }
         }
@@ -111,64 +111,64 @@ impl<'a> Chunk<'a> {
         self.finish(last, ends)
     }
 
-    /// Moves every strip that can move, and lists those that wait with the topologies they miss.
-    fn pass(&mut self, k: usize, shelf: &Shelf, next: Option<&Shelf>, ends: &mut [End], w: &mut Worker) {
+    /// Moves every block that can move, and lists those that wait with the topologies they miss.
+    fn pass(&mut self, k: usize, table: &StepTable, next: Option<&StepTable>, ends: &mut [End], w: &mut Worker) {
         let mut from = 0;
         loop {
-            match (self.sweep)(self.width, &self.shape, &mut self.strips, from, shelf, next, &mut w.keys) {
+            match (self.sweep)(self.width, &self.shape, &mut self.blocks, from, table, next, &mut w.keys) {
                 Stop::End => return,
-                Stop::Caught(strip, lanes) => {
-                    self.retire(strip, lanes, k, ends);
-                    from = strip;
+                Stop::Caught(block, lanes) => {
+                    self.retire(block, lanes, k, ends);
+                    from = block;
                 }
-                Stop::Missing(strip) => {
+                Stop::Missing(block) => {
                     for lane in 0..LANES {
                         w.words.clear();
                         w.words.extend(w.keys.iter().map(|word| word[lane]));
-                        if shelf.find(&w.words) == 0 {
+                        if table.find(&w.words) == 0 {
                             w.missing.push(Topology::from_words(self.shape.rows, self.shape.size, &w.words));
                         }
                     }
-                    w.waiting.push(strip);
-                    from = strip + 1;
+                    w.waiting.push(block);
+                    from = block + 1;
                 }
             }
         }
     }
 
-    /// Moves the strips that waited, from the shelf or, past the table's budget, from what this worker just solved.
+    /// Moves the blocks that waited, from the table or, past the table's budget, from what this worker just solved.
     fn follow(&mut self, k: usize, w: &mut Worker) {
-        let shelf = self.policy.transitions().shelf(k);
-        for &strip in &w.waiting {
-            if self.alone(strip, &shelf, &mut w.keys) {
+        let table = self.policy.transitions().step_table(k);
+        for &block in &w.waiting {
+            if self.alone(block, &table, &mut w.keys) {
                 continue;
             }
             for lane in 0..LANES {
                 w.words.clear();
                 w.words.extend(w.keys.iter().map(|word| word[lane]));
                 if w.local.find(&w.words) == 0 {
-                    let held = shelf.find(&w.words) as usize;
-                    w.local.insert(&w.words, None, shelf.matrix(held));
+                    let held = table.find(&w.words) as usize;
+                    w.local.insert(&w.words, None, table.matrix(held));
                 }
             }
-            let moved = self.alone(strip, &w.local, &mut w.keys);
-            debug_assert!(moved, "a strip misses what was just solved");
+            let moved = self.alone(block, &w.local, &mut w.keys);
+            debug_assert!(moved, "a block misses what was just solved");
         }
     }
 
-    /// Moves one strip, if the shelf holds all it needs.
-    fn alone(&mut self, strip: usize, shelf: &Shelf, keys: &mut Keys) -> bool {
-        let live = self.strips.live;
-        self.strips.live = live.min((strip + 1) * LANES);
-        let stop = (self.sweep)(self.width, &self.shape, &mut self.strips, strip, shelf, None, keys);
-        self.strips.live = live;
+    /// Moves one block, if the table holds all it needs.
+    fn alone(&mut self, block: usize, table: &StepTable, keys: &mut Keys) -> bool {
+        let live = self.blocks.live;
+        self.blocks.live = live.min((block + 1) * LANES);
+        let stop = (self.sweep)(self.width, &self.shape, &mut self.blocks, block, table, None, keys);
+        self.blocks.live = live;
         stop == Stop::End
     }
 
     /// The state of the trial in one place, row by row.
     fn state(&self, place: usize) -> Vec<f64> {
         let width = self.shape.size * self.shape.dim;
-        self.strips.z[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
+        self.blocks.z[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
     }
 
     /// How the trial in one place ends at its present state, if it does.
@@ -177,23 +177,23 @@ impl<'a> Chunk<'a> {
         Reach::new(self.batch.capture_row(trial, self.shape.size)).ends(&self.state(place), self.shape.dim)
     }
 
-    /// Takes the trials in `lanes` of a strip out; the last ones take their places.
-    fn retire(&mut self, strip: usize, lanes: u32, k: usize, ends: &mut [End]) {
+    /// Takes the trials in `lanes` of a block out; the last ones take their places.
+    fn retire(&mut self, block: usize, lanes: u32, k: usize, ends: &mut [End]) {
         // From the highest lane down, so that a trial that moves in has not been looked at.
         for lane in (0..LANES).rev().filter(|lane| lanes >> lane & 1 == 1) {
-            let place = strip * LANES + lane;
+            let place = block * LANES + lane;
             if let Some(outcome) = self.outcome(place) {
                 ends[self.who[place] as usize] = (outcome, k);
             }
-            self.strips.live -= 1;
-            let last = self.strips.live;
+            self.blocks.live -= 1;
+            let last = self.blocks.live;
             self.who[place] = self.who[last];
-            self.strips.copy(&self.shape, last, place);
+            self.blocks.copy(&self.shape, last, place);
         }
-        // Places past the last trial repeat the first of their strip.
-        let live = self.strips.live;
+        // Places past the last trial repeat the first of their block.
+        let live = self.blocks.live;
         for place in live..live.next_multiple_of(LANES) {
-            self.strips.copy(&self.shape, live / LANES * LANES, place);
+            self.blocks.copy(&self.shape, live / LANES * LANES, place);
         }
     }
 
@@ -201,7 +201,7 @@ impl<'a> Chunk<'a> {
     ///
     /// A state that left the range of double precision ends up here: what is no number lies within no radius.
     fn finish(&mut self, last: usize, ends: &mut [End]) -> Result<(), RunError> {
-        for place in 0..self.strips.live {
+        for place in 0..self.blocks.live {
             let trial = self.who[place] as usize;
             if !self.state(place).iter().all(|x| x.abs() <= BEYOND) {
                 let time = self.policy.game().grid().horizon();
@@ -213,7 +213,7 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// Squared reaches of `width` radii a trial in strips, and the lanes from strip to strip: none where all share one row.
+/// Squared reaches of `width` radii a trial in blocks, and the lanes from block to block: none where all share one row.
 fn reaches(radii: &[f64], width: usize, first: usize, trials: usize) -> (Vec<Lane>, usize) {
     if radii.len() == width {
         return (radii.iter().map(|&radius| [squared_reach(radius); LANES]).collect(), 0);

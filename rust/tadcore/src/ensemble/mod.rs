@@ -23,7 +23,7 @@ use crate::policy::Policy;
 use crate::simd::Width;
 use crate::simulation::{Outcome, Setup};
 use chunk::{Chunk, End, Worker};
-use tadcore_kernels::ensemble::{strip, sweep};
+use tadcore_kernels::ensemble::{block, sweep};
 
 /// Trials of one chunk at most.
 pub const CHUNK: usize = 8192;

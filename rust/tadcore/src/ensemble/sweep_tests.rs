@@ -1,11 +1,11 @@
 //! Sweeps against the version for any size, and rims that belong to their balls.
 
 use tadcore_kernels::ensemble::anysize::{observe_any, sweep_any};
-use tadcore_kernels::ensemble::strip::{LANES, Lane, Shape, Stop, Strips};
+use tadcore_kernels::ensemble::block::{Blocks, LANES, Lane, Shape, Stop};
 use tadcore_kernels::ensemble::sweep::{observe, sweep_of};
 
 use crate::network::{self, Topology, squared_reach};
-use crate::policy::step_table::Shelf;
+use crate::policy::step_table::StepTable;
 use crate::simd::{Baseline, Simd, Width};
 use crate::simulation::Reach;
 
@@ -26,15 +26,15 @@ fn rims_belong_to_the_balls_at_every_size() {
         let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
         let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture);
         assert_eq!((keys[0], caught), (Baseline::keys(compiled), u32::from(ends)));
-        // With nothing on the shelf a sweep stops with what it saw, or with whom it caught.
+        // With nothing on the table a sweep stops with what it saw, or with whom it caught.
         let nothing = [-1.0; LANES];
         for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
             let expected = if caught == 0 { Stop::Missing(0) } else { Stop::Caught(0, caught) };
             for width in Width::all() {
                 let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
-                let mut strips = Strips { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
+                let mut blocks = Blocks { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
                 let mut seen = vec![[0; LANES]];
-                let stop = sweep_of(&shape)(width, &shape, &mut strips, 0, &Shelf::new(2, 3), None, &mut seen);
+                let stop = sweep_of(&shape)(width, &shape, &mut blocks, 0, &StepTable::new(2, 3), None, &mut seen);
                 assert_eq!(stop, expected, "{width:?}");
                 assert!(caught != 0 || seen == keys, "{width:?}");
             }
@@ -50,18 +50,18 @@ fn rims_belong_to_the_balls_at_every_size() {
     }
 }
 
-/// Stops, keys and states are those of the version that takes one strip after another, at every width.
+/// Stops, keys and states are those of the version that takes one block after another, at every width.
 #[test]
 fn blocks_stop_where_single_strips_do() {
     let shape = Shape { size: 4, rows: 3, dim: 2, words: 1 };
     // In (−1, 1), without a pattern.
     let wave = |i: usize| ((12.9898 * i as f64 + 4.1).sin() * 43758.5453).fract();
-    let mut shelf = Shelf::new(3, 4);
+    let mut table = StepTable::new(3, 4);
     for key in (0..1 << 12).filter(|key| key % 41 != 3) {
         let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
-        shelf.insert(&[key as u64], None, &matrix);
+        table.insert(&[key as u64], None, &matrix);
     }
-    let strips = || Strips {
+    let blocks = || Blocks {
         z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
         sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
         capture: vec![[0.04; LANES]; 4],
@@ -70,28 +70,28 @@ fn blocks_stop_where_single_strips_do() {
         live: 40 * LANES - 3,
     };
     for width in Width::all() {
-        let (mut ours, mut single) = (strips(), strips());
+        let (mut ours, mut single) = (blocks(), blocks());
         let (mut keys, mut expected) = (vec![[0; LANES]], vec![[0; LANES]]);
         let (mut from, mut counts) = (0, [0; 2]);
         loop {
-            let stop = sweep_of(&shape)(width, &shape, &mut ours, from, &shelf, Some(&shelf), &mut keys);
-            assert_eq!(stop, sweep_any(width, &shape, &mut single, from, &shelf, None, &mut expected), "{width:?}");
+            let stop = sweep_of(&shape)(width, &shape, &mut ours, from, &table, Some(&table), &mut keys);
+            assert_eq!(stop, sweep_any(width, &shape, &mut single, from, &table, None, &mut expected), "{width:?}");
             assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
             match stop {
                 Stop::End => break,
-                Stop::Caught(strip, _) => {
+                Stop::Caught(block, _) => {
                     // All eight a long way off, where nobody sees or catches anybody.
                     for all in [&mut ours, &mut single] {
-                        all.z[8 * strip..][..8]
+                        all.z[8 * block..][..8]
                             .iter_mut()
                             .enumerate()
                             .for_each(|(e, z)| *z = [10.0 * (1 + e) as f64; 8]);
                     }
-                    (from, counts[0]) = (strip, counts[0] + 1);
+                    (from, counts[0]) = (block, counts[0] + 1);
                 }
-                Stop::Missing(strip) => {
+                Stop::Missing(block) => {
                     assert_eq!(keys, expected);
-                    (from, counts[1]) = (strip + 1, counts[1] + 1);
+                    (from, counts[1]) = (block + 1, counts[1] + 1);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! A variant that is not the paper's game: edges that remember.
+//! A variant that is not the paper's game: edges with hysteresis and dwell time.
 //!
 //! In the paper an edge is there at t_k exactly when the distance is at most ζ_i (eq:limob). Under an [`EdgeRule`] the
 //! first network is the paper's, and from then on
@@ -27,7 +27,7 @@ pub struct EdgeRule {
 const WHOLE: f64 = 1e-9;
 
 impl EdgeRule {
-    /// The paper's rule, eq:limob: no memory.
+    /// The paper's rule, eq:limob: neither.
     pub const PAPER: Self = Self { hysteresis: 0.0, dwell: 0.0 };
 
     /// Checks both numbers.
@@ -42,9 +42,9 @@ impl EdgeRule {
     }
 }
 
-/// What the edges of one run remember.
+/// The past of the edges of one run.
 #[derive(Debug)]
-pub struct Memory {
+pub struct EdgeState {
     /// The squared distance up to which an edge of each constrained player is kept.
     keep: Vec<f64>,
     /// Steps for which a changed edge rests.
@@ -54,8 +54,8 @@ pub struct Memory {
     next: Topology,
 }
 
-impl Memory {
-    /// The memory of a run that has not begun: visibility radii ζ, N and δ.
+impl EdgeState {
+    /// The state of a run that has not begun: visibility radii ζ, N and δ.
     #[must_use]
     pub fn new(rule: &EdgeRule, visibility: &[f64], size: usize, step: f64) -> Self {
         Self {
@@ -100,7 +100,7 @@ mod tests {
 
     /// The edge of one player to the attacker at a sequence of distances, ζ = 1, δ = 0.1.
     fn edge(rule: EdgeRule, distances: &[f64]) -> Vec<bool> {
-        let mut memory = Memory::new(&rule, &[1.0], 2, 0.1);
+        let mut memory = EdgeState::new(&rule, &[1.0], 2, 0.1);
         let mut topology = Topology::empty(1, 2);
         let look = |(k, &d): (usize, &f64)| {
             memory.observe(k, &[d, 9.0], 1, &[squared_reach(1.0)], &mut topology);

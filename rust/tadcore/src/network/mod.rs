@@ -13,7 +13,7 @@ mod edge_rule;
 mod topology;
 mod visibility;
 
-pub use edge_rule::{EdgeRule, Memory};
+pub use edge_rule::{EdgeRule, EdgeState};
 pub use topology::Topology;
 pub use visibility::{observe, squared_distance, squared_norm, squared_reach};
 

@@ -1,4 +1,4 @@
-//! The closed loop over one step: ż = C z with the feedback of every player frozen at t_k.
+//! The closed loop over one step: ż = C z with the feedback of every player held at t_k (zero-order hold).
 //!
 //! ż_i = u_i − u_a for each row i (B_d, B_τ and B_a written out), with u_i = g_i z for the constrained players, and
 //! u_a = h_a z, u_a = −r_a⁻¹B_aᵀP_a z = r_a⁻¹(1ᵀP_a) z. In I1 the target's own row is −r_τ⁻¹P_τ[N, :].

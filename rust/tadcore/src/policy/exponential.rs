@@ -1,4 +1,4 @@
-//! exp(Cδ), and with it ∫₀^δ h exp(Cs) ds for one row h: the exact step of a frozen linear loop.
+//! exp(Cδ), and with it ∫₀^δ h exp(Cs) ds for one row h: the exact step of a sampled-data linear loop.
 //!
 //! A Taylor series on a step halved until ‖C‖δ/2^s ≤ ½, summed until its terms vanish, then doubled back s times:
 //! E(2h) = E(h)², a(2h) = a(h) + a(h) E(h). At the sizes of a step (‖C‖δ ≈ 0.02) this is eight small products.

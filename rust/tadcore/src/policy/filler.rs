@@ -3,7 +3,7 @@
 use super::Policy;
 use super::closed_loop::{self, FreeRows};
 use super::exponential;
-use super::step_table::{Shelf, padded};
+use super::step_table::{StepTable, padded};
 use super::transitions::Claim;
 use crate::cancel::CancelToken;
 use crate::error::Cancelled;
@@ -23,10 +23,10 @@ struct Instant<'a> {
     solved: u64,
 }
 
-/// A topology that is wanted, its model, and the order that leads there.
+/// A topology that is wanted, its canonical form, and the order that leads there.
 struct Wanted<'a> {
     topology: &'a Topology,
-    model: Topology,
+    canonical: Topology,
     order: Vec<usize>,
 }
 
@@ -48,7 +48,7 @@ impl Filler {
         policy: &Policy,
         step: usize,
         missing: &[Topology],
-        local: &mut Shelf,
+        local: &mut StepTable,
         cancel: &CancelToken,
     ) -> Result<u64, Cancelled> {
         let claims = policy.transitions.claims(step);
@@ -57,27 +57,27 @@ impl Filler {
         let wanted: Vec<Wanted> = missing
             .iter()
             .map(|topology| {
-                let (model, order) = policy.kinds.model(topology);
-                Wanted { topology, model, order }
+                let (canonical, order) = policy.classes.canonical(topology);
+                Wanted { topology, canonical, order }
             })
             .collect();
         let mut unknown: Vec<&Wanted> =
             wanted.iter().filter(|wanted| !instant.supply(wanted, local, &mut self.padded)).collect();
         // Those with many unknowns first: the quick ones fill the lanes to the end.
-        unknown.sort_by(|a, b| (b.model.edges(), &b.model).cmp(&(a.model.edges(), &a.model)));
-        unknown.dedup_by(|a, b| a.model == b.model);
+        unknown.sort_by(|a, b| (b.canonical.edges(), &b.canonical).cmp(&(a.canonical.edges(), &a.canonical)));
+        unknown.dedup_by(|a, b| a.canonical == b.canonical);
         let group = if policy.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
         let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
         for group in unknown.chunks(group) {
             cancel.check()?;
             let claimed: Vec<(Claim, &Wanted)> =
-                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.model)?, *wanted))).collect();
+                group.iter().filter_map(|wanted| Some((claims.claim(&wanted.canonical)?, *wanted))).collect();
             let mut mine: Vec<&Wanted> = claimed.iter().map(|&(_, wanted)| wanted).collect();
             mine.retain(|wanted| !instant.supply(wanted, local, &mut self.padded));
             self.solve(&mut instant, &mine, local);
         }
         for wanted in &unknown {
-            claims.wait(&wanted.model, cancel)?;
+            claims.wait(&wanted.canonical, cancel)?;
         }
         for wanted in &wanted {
             // Past the budget, or left by a thread that was cancelled.
@@ -89,7 +89,7 @@ impl Filler {
     }
 
     /// Solves entries of one instant together and stores them.
-    fn solve(&mut self, instant: &mut Instant, wanted: &[&Wanted], local: &mut Shelf) {
+    fn solve(&mut self, instant: &mut Instant, wanted: &[&Wanted], local: &mut StepTable) {
         instant.solved += wanted.len() as u64;
         let instant = &*instant;
         let (policy, n) = (instant.policy, instant.policy.game.size());
@@ -108,8 +108,8 @@ impl Filler {
         self.closed_loop.resize(n * n, 0.0);
         self.row.resize(n, 0.0);
         let Self { solver, closed_loop, square, row, padded } = self;
-        let models: Vec<Topology> = unknown.iter().map(|wanted| wanted.model.clone()).collect();
-        solver.solve_all(&instant.problem, &models, Options::default(), |index, gains| {
+        let canonical_forms: Vec<Topology> = unknown.iter().map(|wanted| wanted.canonical.clone()).collect();
+        solver.solve_all(&instant.problem, &canonical_forms, Options::default(), |index, gains| {
             closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
             exponential::exponential(closed_loop, &instant.free.attacker, policy.game.grid().step(), square, row);
             pad(square, &unknown[index].order, padded);
@@ -120,22 +120,22 @@ impl Filler {
 
 impl Instant<'_> {
     /// Makes an entry available that is there already, under its own name or another; says whether it is.
-    fn supply(&self, wanted: &Wanted, local: &mut Shelf, matrix: &mut Vec<f64>) -> bool {
+    fn supply(&self, wanted: &Wanted, local: &mut StepTable, matrix: &mut Vec<f64>) -> bool {
         let game = &self.policy.game;
-        let shelf = self.policy.transitions.shelf(self.step);
+        let table = self.policy.transitions.step_table(self.step);
         let words = wanted.topology.words();
-        if shelf.find(words) != 0 || local.find(words) != 0 {
+        if table.find(words) != 0 || local.find(words) != 0 {
             return true;
         }
-        let model = wanted.model.words();
-        let (held, slot) = match (shelf.find_model(model), local.find_model(model)) {
+        let canonical = wanted.canonical.words();
+        let (held, slot) = match (table.find_canonical(canonical), local.find_canonical(canonical)) {
             (0, 0) => return false,
             (0, slot) => (&*local, slot as usize),
-            (slot, _) => (&*shelf, slot as usize),
+            (slot, _) => (&*table, slot as usize),
         };
         let other = Topology::from_words(game.constrained(), game.size(), held.key(slot));
         let (from, rows) = (held.matrix(slot), padded(game.size()));
-        let of = self.policy.kinds.model(&other).1;
+        let of = self.policy.classes.canonical(&other).1;
         matrix.clear();
         matrix.resize(from.len(), 0.0);
         for (&j, &other_j) in wanted.order.iter().zip(&of) {
@@ -143,17 +143,17 @@ impl Instant<'_> {
                 matrix[j * rows + i] = from[other_j * rows + other_i];
             }
         }
-        drop(shelf);
+        drop(table);
         self.store(wanted, local, matrix);
         true
     }
 
     /// Stores an entry in the table or, where the budget is used up, in `local`.
-    fn store(&self, wanted: &Wanted, local: &mut Shelf, matrix: &[f64]) {
+    fn store(&self, wanted: &Wanted, local: &mut StepTable, matrix: &[f64]) {
         let words = wanted.topology.words();
-        let model = self.policy.kinds.some().then_some(wanted.model.words());
-        if !self.policy.transitions.keep(self.step, words, model, matrix, &self.policy.budget) {
-            local.insert(words, model, matrix);
+        let canonical = self.policy.classes.any().then_some(wanted.canonical.words());
+        if !self.policy.transitions.keep(self.step, words, canonical, matrix, &self.policy.budget) {
+            local.insert(words, canonical, matrix);
         }
     }
 }

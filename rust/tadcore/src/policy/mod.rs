@@ -4,7 +4,7 @@
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
-//! | C | [`closed_loop::matrix`] | ż = C z with all feedback frozen at t_k |
+//! | C | [`closed_loop::matrix`] | ż = C z with all feedback gains held at t_k (zero-order hold) |
 //! | exp(Cδ) | [`StepPolicy::transition`] | z(t_{k+1}) = exp(Cδ) z(t_k) |
 //! | h_a ∫exp(Cs)ds | [`StepPolicy::attacker`] | how far the attacker itself moves in the step |
 //!
@@ -15,8 +15,8 @@ mod budget;
 pub mod closed_loop;
 pub mod exponential;
 pub(crate) mod filler;
-mod relabelling;
 mod saved;
+mod symmetry;
 mod table;
 pub(crate) mod transitions;
 
@@ -33,7 +33,7 @@ use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
 use budget::Budget;
-use relabelling::Kinds;
+use symmetry::SymmetryClasses;
 use table::Table;
 use transitions::Transitions;
 
@@ -59,7 +59,7 @@ impl StepPolicy {
 pub struct Policy {
     game: Game,
     equilibrium: Equilibrium,
-    kinds: Kinds,
+    classes: SymmetryClasses,
     budget: Budget,
     table: Table,
     transitions: Transitions,
@@ -75,8 +75,8 @@ impl Policy {
         let steps = game.grid().steps();
         let (table, budget) = (Table::new(steps + 1), Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size());
-        let kinds = Kinds::of(&game);
-        Ok(Self { game, equilibrium, kinds, budget, table, transitions })
+        let classes = SymmetryClasses::of(&game);
+        Ok(Self { game, equilibrium, classes, budget, table, transitions })
     }
 
     /// The game.
@@ -136,17 +136,17 @@ impl Policy {
     /// The gains of `problem`, one of this policy's, under a topology by any method, without looking at the table.
     #[must_use]
     pub fn gains(&self, problem: &Problem, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
-        let (model, order) = self.kinds.model(topology);
-        let gains = solver.solve(problem, &model, options);
-        Gains { rows: relabelling::back(&order, &gains.rows), ..gains }
+        let (canonical, order) = self.classes.canonical(topology);
+        let gains = solver.solve(problem, &canonical, options);
+        Gains { rows: symmetry::back(&order, &gains.rows), ..gains }
     }
 
     /// Solves (step, topology) without looking at the table.
     #[must_use]
     pub fn solve(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> StepPolicy {
-        let (model, order) = self.kinds.model(topology);
+        let (canonical, order) = self.classes.canonical(topology);
         let n = self.game.size();
-        let gains = solver.solve(&self.problem(step), &model, Options::default());
+        let gains = solver.solve(&self.problem(step), &canonical, Options::default());
         let free = self.free_rows(step);
         let mut c = vec![0.0; n * n];
         closed_loop::matrix(&free, &gains.rows, &mut c);
@@ -155,8 +155,8 @@ impl Policy {
         let mut own = vec![0.0; n];
         order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
         StepPolicy {
-            gains: Gains { rows: relabelling::back(&order, &gains.rows), ..gains },
-            transition: relabelling::back(&order, &transition),
+            gains: Gains { rows: symmetry::back(&order, &gains.rows), ..gains },
+            transition: symmetry::back(&order, &transition),
             attacker: own,
         }
     }
@@ -173,8 +173,9 @@ impl Policy {
     pub fn load_transitions(&self, bytes: &[u8]) -> Result<usize, TableError> {
         let (rows, size) = (self.game.constrained(), self.game.size());
         saved::read(bytes, &self.game, |step, key, matrix| {
-            let model = self.kinds.some().then(|| self.kinds.model(&Topology::from_words(rows, size, key)).0);
-            self.transitions.keep(step, key, model.as_ref().map(Topology::words), matrix, &self.budget);
+            let canonical =
+                self.classes.any().then(|| self.classes.canonical(&Topology::from_words(rows, size, key)).0);
+            self.transitions.keep(step, key, canonical.as_ref().map(Topology::words), matrix, &self.budget);
         })?;
         Ok(self.transitions.entries())
     }

@@ -97,13 +97,13 @@ pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
     out.extend_from_slice(&shape.identity);
     let mut count = 0u64;
     for step in 0..shape.steps {
-        let shelf = transitions.shelf(step);
-        count += shelf.len() as u64;
-        out.reserve(shelf.len() * shape.entry);
-        for (i, key) in shelf.keys().enumerate() {
+        let table = transitions.step_table(step);
+        count += table.len() as u64;
+        out.reserve(table.len() * shape.entry);
+        for (i, key) in table.keys().enumerate() {
             out.extend_from_slice(&(step as u64).to_le_bytes());
             key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
-            for column in shelf.matrix(i + 1).chunks_exact(padded(shape.size)) {
+            for column in table.matrix(i + 1).chunks_exact(padded(shape.size)) {
                 column[..shape.size].iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
             }
         }

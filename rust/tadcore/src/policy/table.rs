@@ -1,6 +1,6 @@
 //! The answers of the policy by step and topology, gains and all: what recorded runs read, computed once.
 //!
-//! One shelf per grid instant behind its own lock, so that threads at different instants never meet. What is stored is a
+//! One map per grid instant behind its own lock, so that threads at different instants never meet. What is stored is a
 //! function of (step, topology) alone: it does not matter who computes an entry, nor whether it is kept. Past the byte
 //! budget entries are simply not kept.
 
@@ -30,21 +30,21 @@ pub struct TableStats {
     pub capacity: usize,
 }
 
-type Shelf = RwLock<HashMap<Topology, Arc<StepPolicy>>>;
+type StepAnswers = RwLock<HashMap<Topology, Arc<StepPolicy>>>;
 
 /// Answers of the policy by grid instant and topology, within a byte budget.
 #[derive(Debug)]
 pub(super) struct Table {
-    shelves: Vec<Shelf>,
+    instants: Vec<StepAnswers>,
     entries: AtomicUsize,
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
 }
 
 impl Table {
-    pub(super) fn new(instants: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self {
-            shelves: (0..instants).map(|_| Shelf::default()).collect(),
+            instants: (0..count).map(|_| StepAnswers::default()).collect(),
             entries: AtomicUsize::new(0),
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
@@ -61,7 +61,7 @@ impl Table {
 
     /// The entry, if it is held, without counting.
     pub(super) fn peek(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
-        self.shelves[step].read().unwrap_or_else(PoisonError::into_inner).get(topology).cloned()
+        self.instants[step].read().unwrap_or_else(PoisonError::into_inner).get(topology).cloned()
     }
 
     /// Keeps the entry if the budget allows.
@@ -70,8 +70,8 @@ impl Table {
         if !budget.take(size) {
             return;
         }
-        let mut shelf = self.shelves[step].write().unwrap_or_else(PoisonError::into_inner);
-        if shelf.insert(topology.clone(), Arc::clone(entry)).is_some() {
+        let mut answers = self.instants[step].write().unwrap_or_else(PoisonError::into_inner);
+        if answers.insert(topology.clone(), Arc::clone(entry)).is_some() {
             budget.give(size);
         } else {
             self.entries.fetch_add(1, Ordering::Relaxed);

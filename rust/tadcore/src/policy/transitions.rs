@@ -1,7 +1,7 @@
 //! The (step, topology) table of one-step transitions, shared by every chunk, thread and call on a game.
 //!
-//! One [`Shelf`] per grid instant behind its own lock. What is stored is a function of (step, topology) alone, so it
-//! does not matter who computes an entry, nor whether it is kept. An entry is *claimed* before it is solved: threads
+//! One [`StepTable`] per grid instant behind its own lock. What is stored is a function of (step, topology) alone, so
+//! it does not matter who computes an entry, nor whether it is kept. An entry is *claimed* before it is solved: threads
 //! that meet at an instant share the missing entries among themselves instead of solving them twice. Past the byte
 //! budget entries are not kept: each chunk then solves its own, for one step at a time.
 
@@ -11,7 +11,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard
 use std::time::Duration;
 
 use super::budget::Budget;
-use super::step_table::Shelf;
+use super::step_table::StepTable;
 use crate::cancel::CancelToken;
 use crate::error::Cancelled;
 use crate::network::Topology;
@@ -74,7 +74,7 @@ impl Drop for Claim<'_> {
 /// Transitions by grid instant and topology, within a byte budget.
 #[derive(Debug)]
 pub(crate) struct Transitions {
-    shelves: Vec<RwLock<Shelf>>,
+    tables: Vec<RwLock<StepTable>>,
     claims: Vec<Claims>,
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
@@ -84,7 +84,7 @@ pub(crate) struct Transitions {
 impl Transitions {
     pub(super) fn new(steps: usize, rows: usize, size: usize) -> Self {
         Self {
-            shelves: (0..steps).map(|_| RwLock::new(Shelf::new(rows, size))).collect(),
+            tables: (0..steps).map(|_| RwLock::new(StepTable::new(rows, size))).collect(),
             claims: (0..steps).map(|_| Claims::default()).collect(),
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
@@ -92,9 +92,9 @@ impl Transitions {
         }
     }
 
-    /// The shelf of an instant, for reading.
-    pub(crate) fn shelf(&self, step: usize) -> RwLockReadGuard<'_, Shelf> {
-        self.shelves[step].read().unwrap_or_else(PoisonError::into_inner)
+    /// The table of an instant, for reading.
+    pub(crate) fn step_table(&self, step: usize) -> RwLockReadGuard<'_, StepTable> {
+        self.tables[step].read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What threads are solving at an instant.
@@ -118,17 +118,17 @@ impl Transitions {
         &self,
         step: usize,
         words: &[u64],
-        model: Option<&[u64]>,
+        canonical: Option<&[u64]>,
         matrix: &[f64],
         budget: &Budget,
     ) -> bool {
-        let mut shelf = self.shelves[step].write().unwrap_or_else(PoisonError::into_inner);
-        if shelf.find(words) != 0 {
+        let mut table = self.tables[step].write().unwrap_or_else(PoisonError::into_inner);
+        if table.find(words) != 0 {
             return true;
         }
-        let kept = budget.take(shelf.entry_bytes(model.is_some()));
+        let kept = budget.take(table.entry_bytes(canonical.is_some()));
         if kept {
-            shelf.insert(words, model, matrix);
+            table.insert(words, canonical, matrix);
             self.entries.fetch_add(1, Ordering::Relaxed);
         }
         kept

@@ -6,7 +6,8 @@
 //! | σ | [`Reach`] | capture radii |
 //! | ζ | [`Setup::visibility`] | visibility radii |
 //!
-//! The sampled-data reading of the paper: feedback and network are frozen between grid instants, the motion is exact.
+//! The sampled-data reading of the paper: feedback and network are held between grid instants
+//! (zero-order hold), the motion is exact.
 
 mod outcome;
 mod record;

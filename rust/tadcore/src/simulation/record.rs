@@ -5,7 +5,7 @@ use super::setup::Setup;
 use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::validation::BEYOND;
-use crate::network::{EdgeRule, Memory, Topology, observe, squared_reach};
+use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
 
@@ -49,7 +49,7 @@ pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<
     simulate_with(policy, setup, &EdgeRule::PAPER, cancel)
 }
 
-/// The same with edges that remember, unless `rule` is the paper's.
+/// The same with hysteresis and dwell time of the edges, unless `rule` is the paper's.
 ///
 /// # Errors
 /// [`RunError`] for positions, radii or a rule that cannot be accepted, or when the caller cancelled.
@@ -69,7 +69,8 @@ pub fn simulate_with(
     relative_state(setup.positions, dim, &mut z);
     let mut attacker = setup.positions[(n + 1) * dim..].to_vec();
     let mut topology = Topology::empty(m, size);
-    let mut memory = (*rule != EdgeRule::PAPER).then(|| Memory::new(rule, setup.visibility, size, game.grid().step()));
+    let mut edges =
+        (*rule != EdgeRule::PAPER).then(|| EdgeState::new(rule, setup.visibility, size, game.grid().step()));
     let mut solver = Synthesizer::new();
     let mut record = Record {
         outcome: Outcome::Timeout,
@@ -91,9 +92,9 @@ pub fn simulate_with(
         cancel.check()?;
         let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
         if end.is_none() || k == 0 {
-            match &mut memory {
+            match &mut edges {
                 None => observe(&z, dim, &sight, &mut topology),
-                Some(memory) => memory.observe(k, &z, dim, &sight, &mut topology),
+                Some(edges) => edges.observe(k, &z, dim, &sight, &mut topology),
             }
         }
         let step = policy.at(k, &topology, &mut solver);

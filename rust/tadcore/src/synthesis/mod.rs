@@ -31,22 +31,22 @@ pub mod search;
 mod theta;
 
 pub use newton::Status;
-pub use search::Look;
 pub(crate) use search::SIDE_BY_SIDE_UP_TO;
+pub use search::Start;
 pub(crate) use tadcore_kernels::synthesis::newton;
 pub use theta::Problem;
 
 use crate::network::Topology;
 use newton::{Limits, Tasks};
-use search::{Engine, Entry, Search};
+use search::{Candidate, Dispatcher, Search};
 
 /// How the gains are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Exact-Hessian Newton with the further looks: the method the policy uses.
+    /// Exact-Hessian Newton with restarts: the method the policy uses.
     #[default]
     Newton,
-    /// The paper's gradient descent from the canonical start, without further looks.
+    /// The paper's gradient descent from the canonical start, without restarts.
     Descent,
 }
 
@@ -95,8 +95,8 @@ pub struct Gains {
     pub status: Status,
     /// Whether the minimum is proved to be global.
     pub certified: bool,
-    /// The look that won.
-    pub look: Look,
+    /// The start whose descent won.
+    pub start: Start,
 }
 
 impl Gains {
@@ -116,7 +116,7 @@ impl Gains {
 /// A solver with its scratch memory; one per thread.
 #[derive(Debug, Default)]
 pub struct Synthesizer {
-    engine: Engine,
+    dispatcher: Dispatcher,
     tasks: Tasks,
     doubled: Tasks,
 }
@@ -150,39 +150,39 @@ impl Synthesizer {
             acceptable: TOLERANCE.1,
             longest: f64::INFINITY,
         };
-        let mut entries: Vec<Entry> = topologies
+        let mut candidates: Vec<Candidate> = topologies
             .iter()
             .map(|topology| {
                 let mut start = vec![0.0; problem.rows * problem.size];
                 search::canonical(problem, topology, &mut start);
-                Entry::new(search::variables(topology), start)
+                Candidate::new(search::variables(topology), start)
             })
             .collect();
-        let Self { engine, tasks, doubled } = self;
-        let mut search = Search { problem, limits, engine, tasks, doubled };
+        let Self { dispatcher, tasks, doubled } = self;
+        let mut search = Search { problem, limits, dispatcher, tasks, doubled };
         match options.method {
-            Method::Newton => search.run(&mut entries),
+            Method::Newton => search.run(&mut candidates),
             Method::Descent => {
-                for (entry, topology) in entries.iter_mut().zip(topologies) {
+                for (candidate, topology) in candidates.iter_mut().zip(topologies) {
                     let variables = search::paper_variables(topology);
-                    entry.reached = search::descend(problem, &mut entry.g, &variables, limits);
-                    entry.iterations = entry.reached.iterations;
+                    candidate.reached = search::descend(problem, &mut candidate.g, &variables, limits);
+                    candidate.iterations = candidate.reached.iterations;
                 }
-                let all: Vec<usize> = (0..entries.len()).collect();
-                search.certify(&mut entries, &all);
+                let all: Vec<usize> = (0..candidates.len()).collect();
+                search.certify(&mut candidates, &all);
             }
         }
-        for (index, entry) in entries.into_iter().enumerate() {
+        for (index, candidate) in candidates.into_iter().enumerate() {
             each(
                 index,
                 Gains {
-                    rows: entry.g,
-                    theta: entry.reached.value,
-                    gradient_norm: entry.reached.gradient_norm,
-                    iterations: entry.iterations,
-                    status: entry.reached.status,
-                    certified: entry.certified && entry.reached.status == Status::Converged,
-                    look: entry.look,
+                    rows: candidate.g,
+                    theta: candidate.reached.value,
+                    gradient_norm: candidate.reached.gradient_norm,
+                    iterations: candidate.iterations,
+                    status: candidate.reached.status,
+                    certified: candidate.certified && candidate.reached.status == Status::Converged,
+                    start: candidate.start,
                 },
             );
         }

@@ -7,8 +7,8 @@ use crate::game::Interaction;
 use crate::simd::Width;
 
 mod descents;
-mod kinds;
 mod single;
+mod starts;
 
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
     let width = objective.width();
@@ -124,14 +124,14 @@ fn neighbours_and_width_change_nothing() {
             .map(|bits| Topology::from_words(m, n, &[bits]))
             .collect();
         let solve = |width, topologies: &[Topology]| {
-            let mut solver = Synthesizer { engine: Engine::of(width), ..Synthesizer::default() };
+            let mut solver = Synthesizer { dispatcher: Dispatcher::of(width), ..Synthesizer::default() };
             let mut all = Vec::new();
             solver.solve_all(&problem, topologies, Options::default(), |_, gains| all.push(gains));
             all
         };
         let alone: Vec<Gains> =
             topologies.iter().flat_map(|topology| solve(Width::Baseline, std::slice::from_ref(topology))).collect();
-        assert!(alone.iter().any(|gains| !gains.certified), "no network needs a further look");
+        assert!(alone.iter().any(|gains| !gains.certified), "no network needs a restart");
         for width in Width::all() {
             assert_eq!(solve(width, &topologies), alone, "{width:?}");
             for (topology, gains) in topologies.iter().zip(&alone) {

@@ -23,7 +23,7 @@ const LIBRARY_SIZE: usize = 512;
 
 /// What may work on one matrix at a time.
 #[derive(Debug, Clone, Copy)]
-pub struct Means {
+pub struct Backend {
     /// faer, on large matrices; its bits differ from those of the loops here.
     pub library: bool,
     /// Registers, with the same bits.
@@ -35,14 +35,14 @@ pub struct Means {
 ///
 /// An unknown that a lane does not have (`layout`) has the unit row there.
 #[inline(always)]
-pub fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, means: Means, f: &mut [T]) -> (T::Mask, T) {
+pub fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, backend: Backend, f: &mut [T]) -> (T::Mask, T) {
     let d = layout.len();
     if let (Some(h), Some(f)) = (T::alone(h), T::alone_mut(f)) {
         let (damping, used) = (damping.lane(0), layout.used());
-        let (definite, lack) = if means.library && d >= LIBRARY_SIZE {
+        let (definite, lack) = if backend.library && d >= LIBRARY_SIZE {
             (factorise_large(h, damping, used, d, f), 0.0)
         } else {
-            factorise_one(means.width, h, damping, used, d, f)
+            factorise_one(backend.width, h, damping, used, d, f)
         };
         return (T::mask(u16::from(definite)), T::splat(lack));
     }
@@ -180,9 +180,9 @@ mod tests {
             .collect()
     }
 
-    fn means() -> Vec<Means> {
-        let alone = Width::all().into_iter().map(|width| Means { library: false, width });
-        alone.chain([Means { library: true, width: Width::Baseline }]).collect()
+    fn backends() -> Vec<Backend> {
+        let alone = Width::all().into_iter().map(|width| Backend { library: false, width });
+        alone.chain([Backend { library: true, width: Width::Baseline }]).collect()
     }
 
     #[test]
@@ -192,7 +192,7 @@ mod tests {
                 (lower(used, |i, j| ((i * 7 + j * 3) as f64).sin() + if i == j { 40.0 } else { 0.0 }), layout(used));
             let factors = Width::all().into_iter().map(|width| {
                 let mut f = vec![0.0; layout.len() * layout.len()];
-                let answer = factorise(&h, 0.125, &layout, Means { library: false, width }, &mut f);
+                let answer = factorise(&h, 0.125, &layout, Backend { library: false, width }, &mut f);
                 (answer, f)
             });
             let factors: Vec<_> = factors.collect();
@@ -211,9 +211,9 @@ mod tests {
             let full = layout.len();
             let mut b: Vec<f64> = (0..d).map(|i| (i as f64 + 1.0).sin()).collect();
             b.resize(full, 0.0);
-            for means in means() {
+            for backend in backends() {
                 let (mut f, mut x) = (vec![f64::NAN; full * full], b.clone());
-                assert!(factorise(&h, damping, &layout, means, &mut f).0);
+                assert!(factorise(&h, damping, &layout, backend, &mut f).0);
                 let form = forward(&f, full, &mut x);
                 back(&f, full, &mut x);
                 for i in 0..d {
@@ -228,8 +228,8 @@ mod tests {
 
     #[test]
     fn an_indefinite_matrix_is_refused() {
-        for (d, means) in
-            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
+        for (d, backend) in
+            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| backends().into_iter().map(move |backend| (d, backend)))
         {
             for second in [2.0, 1.0] {
                 // Two pairs of rows, each with a pivot of 1 − x²; the first counts.
@@ -240,22 +240,22 @@ mod tests {
                 });
                 let layout = layout(d);
                 let mut f = vec![0.0; layout.len() * layout.len()];
-                let (definite, lack) = factorise(&h, 0.0, &layout, means, &mut f);
+                let (definite, lack) = factorise(&h, 0.0, &layout, backend, &mut f);
                 assert!(!definite, "{d} {second}");
-                assert!(means.library && d >= LIBRARY_SIZE || lack == second * second - 1.0, "{d} {lack}");
+                assert!(backend.library && d >= LIBRARY_SIZE || lack == second * second - 1.0, "{d} {lack}");
             }
         }
     }
 
     #[test]
     fn damping_lifts_a_negative_matrix() {
-        for (d, means) in
-            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| means().into_iter().map(move |means| (d, means)))
+        for (d, backend) in
+            [2, 7, LIBRARY_SIZE].into_iter().flat_map(|d| backends().into_iter().map(move |backend| (d, backend)))
         {
             let (h, layout) = (lower(d, |i, j| if i == j { -0.5 } else { 0.0 }), layout(d));
             let mut f = vec![0.0; layout.len() * layout.len()];
-            assert!(!factorise(&h, 0.25, &layout, means, &mut f).0, "{d}");
-            assert!(factorise(&h, 1.0, &layout, means, &mut f).0, "{d}");
+            assert!(!factorise(&h, 0.25, &layout, backend, &mut f).0, "{d}");
+            assert!(factorise(&h, 1.0, &layout, backend, &mut f).0, "{d}");
         }
     }
 }

@@ -21,7 +21,7 @@
 //!
 //! All methods are inlined into one function, which is compiled for the instructions of its lanes.
 
-use super::factor::{self, Means};
+use super::factor::{self, Backend};
 use super::layout::{Layout, packed};
 use super::objective::Objective;
 use super::tasks::{Limits, Owner, Reached, Tasks};
@@ -53,10 +53,10 @@ pub fn minimise<T: Number, O: Objective<T>>(
     tasks: &mut Tasks,
     owners: &[Owner],
     limits: Limits,
-    means: Means,
+    backend: Backend,
     w: &mut Workspace<T>,
 ) {
-    let mut descents = Descents::new(objective, tasks, owners, limits, means, w);
+    let mut descents = Descents::new(objective, tasks, owners, limits, backend, w);
     loop {
         descents.refill();
         if descents.busy == 0 {
@@ -125,7 +125,7 @@ struct Descents<'a, T: Number, O> {
     tasks: &'a mut Tasks,
     owners: &'a [Owner<'a>],
     limits: Limits,
-    means: Means,
+    backend: Backend,
     layout: &'a mut Layout<T>,
     /// The points, and the gradients there with respect to all gains; the same for the points tried.
     g: &'a mut [T],
@@ -163,7 +163,7 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
         tasks: &'a mut Tasks,
         owners: &'a [Owner<'a>],
         limits: Limits,
-        means: Means,
+        backend: Backend,
         w: &'a mut Workspace<T>,
     ) -> Self {
         let (width, zero, noise_scale) = (objective.width(), T::splat(0.0), T::splat(objective.value_scale()));
@@ -174,13 +174,13 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
             tasks,
             owners,
             limits,
-            means,
+            backend,
             layout: &mut w.layout,
             g: &mut w.g[..width],
             full: &mut w.slope[..width],
             trial: &mut w.trial[..width],
             trial_full: &mut w.trial_slope[..width],
-            best: &mut w.rival[..width],
+            best: &mut w.incumbent[..width],
             row: &mut w.row,
             hessian: &mut w.hessian,
             factor: &mut w.factor,
@@ -237,7 +237,7 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
         let (complex, scale) = self.tasks.kind(next);
         self.objective.set_lane(lane, complex, scale);
         self.compared &= !bit;
-        if let Some(known) = owner.rival {
+        if let Some(known) = owner.incumbent {
             self.compared |= bit;
             for (best, &x) in self.best.iter_mut().zip(known.g) {
                 best.set_lane(lane, x);
@@ -268,7 +268,7 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
         let raise = (T::splat(4.0) * self.s.damping).or_larger(T::splat(FIRST_DAMPING) * largest).or_larger(T::least());
         let d = self.layout.len();
         let (hessian, factor) = (&self.hessian[..packed(d)], &mut self.factor[..d * d]);
-        let (definite, lack) = factor::factorise(hessian, self.s.damping, self.layout, self.means, factor);
+        let (definite, lack) = factor::factorise(hessian, self.s.damping, self.layout, self.backend, factor);
         let definite = T::bits(definite) & known;
         round.failed = known & !definite;
         // An indefinite matrix lacks about what its pivot did.

@@ -22,12 +22,12 @@ mod tile;
 mod variables;
 mod workspace;
 
-pub use factor::{Means, factorise};
+pub use factor::{Backend, factorise};
 pub use layout::packed;
 pub use layout::{Form, Layout, Slot};
 pub use minimise::minimise;
 pub use objective::Objective;
 pub use tasks::Status;
-pub use tasks::{Limits, Owner, Reached, Rival, Tasks};
+pub use tasks::{Incumbent, Limits, Owner, Reached, Tasks};
 pub use variables::{Variable, advance, balance};
 pub use workspace::Workspace;

@@ -63,7 +63,7 @@ impl Reached {
 
 /// The best point known: a descent that only leads back to it, or cannot get below it, need not be finished.
 #[derive(Debug, Clone, Copy)]
-pub struct Rival<'a> {
+pub struct Incumbent<'a> {
     pub g: &'a [f64],
     pub value: f64,
     /// Distance at which a descent has come back to it.
@@ -74,7 +74,7 @@ pub struct Rival<'a> {
 #[derive(Debug, Clone, Copy)]
 pub struct Owner<'a> {
     pub variables: &'a [Variable],
-    pub rival: Option<Rival<'a>>,
+    pub incumbent: Option<Incumbent<'a>>,
 }
 
 /// Descents to be made: where they start and, later, where they ended.
@@ -89,8 +89,8 @@ pub struct Tasks {
     whose: Vec<(usize, bool, f64)>,
     reached: Vec<Reached>,
     certified: Vec<bool>,
-    /// Whether a descent ended because it cannot get below its rival.
-    settled: Vec<bool>,
+    /// Whether a descent ended because it cannot get below its incumbent.
+    pruned: Vec<bool>,
 }
 
 impl Tasks {
@@ -101,7 +101,7 @@ impl Tasks {
         self.whose.clear();
         self.reached.clear();
         self.certified.clear();
-        self.settled.clear();
+        self.pruned.clear();
     }
 
     /// Adds a descent of `owner`'s, and gives its start to be written.
@@ -111,7 +111,7 @@ impl Tasks {
         self.whose.push((owner, complex, scale));
         self.reached.push(Reached::default());
         self.certified.push(false);
-        self.settled.push(false);
+        self.pruned.push(false);
         &mut self.points[from..]
     }
 
@@ -140,12 +140,12 @@ impl Tasks {
         &mut self.points[task * self.length..][..self.length]
     }
 
-    pub fn end(&mut self, task: usize, reached: Reached, settled: bool) {
-        (self.reached[task], self.settled[task]) = (reached, settled);
+    pub fn end(&mut self, task: usize, reached: Reached, pruned: bool) {
+        (self.reached[task], self.pruned[task]) = (reached, pruned);
     }
 
-    pub fn settled(&self, task: usize) -> bool {
-        self.settled[task]
+    pub fn pruned(&self, task: usize) -> bool {
+        self.pruned[task]
     }
 
     /// Drops the descents that `keep` does not name; none of them has been made.
@@ -160,7 +160,7 @@ impl Tasks {
         self.whose.truncate(kept);
         self.reached.truncate(kept);
         self.certified.truncate(kept);
-        self.settled.truncate(kept);
+        self.pruned.truncate(kept);
     }
 
     pub fn reached(&self, task: usize) -> Reached {

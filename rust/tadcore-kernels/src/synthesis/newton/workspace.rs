@@ -17,7 +17,7 @@ pub struct Workspace<T: Number> {
     /// The gradients there.
     pub trial_slope: Vec<T>,
     /// The best points known.
-    pub rival: Vec<T>,
+    pub incumbent: Vec<T>,
     /// A row of a form on all gains, the form restricted to the variables, and its factor.
     pub row: Vec<T>,
     pub hessian: Vec<T>,
@@ -37,7 +37,7 @@ impl<T: Number> Default for Workspace<T> {
             slope: empty(),
             trial: empty(),
             trial_slope: empty(),
-            rival: empty(),
+            incumbent: empty(),
             row: empty(),
             hessian: empty(),
             factor: empty(),
@@ -59,7 +59,7 @@ impl<T: Number> Workspace<T> {
             }
         };
         for vector in
-            [&mut self.g, &mut self.slope, &mut self.trial, &mut self.trial_slope, &mut self.rival, &mut self.row]
+            [&mut self.g, &mut self.slope, &mut self.trial, &mut self.trial_slope, &mut self.incumbent, &mut self.row]
         {
             room(vector, width);
         }

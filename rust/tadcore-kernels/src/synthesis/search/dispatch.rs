@@ -7,8 +7,8 @@
 use std::any::Any;
 
 use crate::simd::{Number, Width, dispatch, widened};
-use crate::synthesis::newton::{Limits, Means, Objective, Owner, Tasks, Workspace, factorise, minimise};
-use crate::synthesis::theta::{Certificate, Doubled, Parts, Precisions, RealGains};
+use crate::synthesis::newton::{Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, minimise};
+use crate::synthesis::theta::{Certificate, Coefficients, Doubled, Precisions, RealGains};
 
 /// N up to which there is a version with constant loop bounds.
 pub const CONSTANT_UP_TO: usize = 8;
@@ -27,19 +27,19 @@ pub enum Kind {
     /// In the gains themselves; each end point is then tried for the certificate.
     Certified,
     /// In the gains themselves, in single precision where the problem has it.
-    Scout,
+    Screening,
     /// In twice as many, complex or stacked; in single precision where the problem has it.
     Doubled,
 }
 
 /// Runs lists at one width.
 #[derive(Debug)]
-pub struct Engine {
+pub struct Dispatcher {
     width: Width,
     scratch: Scratch,
 }
 
-impl Default for Engine {
+impl Default for Dispatcher {
     fn default() -> Self {
         Self::of(Width::in_use())
     }
@@ -65,11 +65,11 @@ struct List<'a> {
     tasks: &'a mut Tasks,
     owners: &'a [Owner<'a>],
     limits: Limits,
-    means: Means,
+    backend: Backend,
 }
 
-impl Engine {
-    /// An engine of a width that the processor has.
+impl Dispatcher {
+    /// A dispatcher for a width that the processor has.
     pub fn of(width: Width) -> Self {
         Self { width, scratch: Scratch::default() }
     }
@@ -99,17 +99,17 @@ impl Engine {
         owners: &[Owner],
         limits: Limits,
     ) {
-        let means = Means { library: problem.double.size > CONSTANT_UP_TO, width: self.width };
-        let mut list = List { kind, tasks, owners, limits, means };
+        let backend = Backend { library: problem.double.size > CONSTANT_UP_TO, width: self.width };
+        let mut list = List { kind, tasks, owners, limits, backend };
         let (width, scratch) = (self.width, &mut self.scratch);
         let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
         let single = problem.single.as_ref().filter(|_| side_by_side(N));
         match (kind, single) {
-            (Kind::Scout | Kind::Doubled, Some(parts)) => {
+            (Kind::Screening | Kind::Doubled, Some(coefficients)) => {
                 if const { side_by_side(N) } && several {
-                    return several_single::<N>(width, parts, &mut list, scratch);
+                    return several_single::<N>(width, coefficients, &mut list, scratch);
                 }
-                one_single(width, parts, &mut list, scratch);
+                one_single(width, coefficients, &mut list, scratch);
             }
             _ => {
                 if const { side_by_side(N) } && several && kind != Kind::Doubled {
@@ -140,76 +140,80 @@ pub fn single(problem: &Precisions) -> bool {
 
 dispatch! {
     /// As many descents side by side as a register holds.
-    fn several_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+    fn several_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) {
         if const { V::SIZED } {
-            descend::<V::Double, N>(parts, list, scratch.of());
+            descend::<V::Double, N>(coefficients, list, scratch.of());
         } else {
-            any_size::<f64>(parts, list, scratch.of());
+            any_size::<f64>(coefficients, list, scratch.of());
         }
     }
 }
 
 dispatch! {
     /// The same in single precision.
-    fn several_single<V, const N: usize>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+    fn several_single<V, const N: usize>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) {
         if const { !V::SIZED } {
-            any_size::<f32>(parts, list, scratch.of());
+            any_size::<f32>(coefficients, list, scratch.of());
         } else if list.kind == Kind::Doubled {
-            descend_doubled::<V::Half, N>(parts, list, scratch.of());
+            descend_doubled::<V::Half, N>(coefficients, list, scratch.of());
         } else {
-            descend::<V::Single, N>(parts, list, scratch.of());
+            descend::<V::Single, N>(coefficients, list, scratch.of());
         }
     }
 }
 
 widened! {
     /// One descent after another.
-    fn one_double<V, const N: usize>(parts: &Parts<f64>, list: &mut List, scratch: &mut Scratch) {
+    fn one_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) {
         if const { !V::SIZED } {
-            any_size::<f64>(parts, list, scratch.of());
+            any_size::<f64>(coefficients, list, scratch.of());
         } else if const { side_by_side(N) } || list.kind != Kind::Doubled {
-            descend::<f64, N>(parts, list, scratch.of());
+            descend::<f64, N>(coefficients, list, scratch.of());
         } else {
-            descend_doubled::<f64, N>(parts, list, scratch.of());
+            descend_doubled::<f64, N>(coefficients, list, scratch.of());
         }
     }
 }
 
 widened! {
     /// The same in single precision: seldom enough for one version for all sizes.
-    fn one_single<V>(parts: &Parts<f32>, list: &mut List, scratch: &mut Scratch) {
+    fn one_single<V>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) {
         if const { V::SIZED } {
-            run::<f32, 0>(parts, list, scratch.of());
+            run::<f32, 0>(coefficients, list, scratch.of());
         } else {
-            any_size::<f32>(parts, list, scratch.of());
+            any_size::<f32>(coefficients, list, scratch.of());
         }
     }
 }
 
 #[inline(never)]
-fn any_size<T: Number>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
-    run::<T, 0>(parts, list, w);
+fn any_size<T: Number>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    run::<T, 0>(coefficients, list, w);
 }
 
 #[inline(always)]
-fn run<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+fn run<T: Number, const N: usize>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
     match list.kind {
-        Kind::Doubled => descend_doubled::<T, N>(parts, list, w),
-        _ => descend::<T, N>(parts, list, w),
+        Kind::Doubled => descend_doubled::<T, N>(coefficients, list, w),
+        _ => descend::<T, N>(coefficients, list, w),
     }
 }
 
 #[inline(always)]
-fn descend_doubled<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
-    minimise(&mut Doubled::<T, N>::new(parts), list.tasks, list.owners, list.limits, list.means, w);
+fn descend_doubled<T: Number, const N: usize>(
+    coefficients: &Coefficients<T::Scalar>,
+    list: &mut List,
+    w: &mut Workspace<T>,
+) {
+    minimise(&mut Doubled::<T, N>::new(coefficients), list.tasks, list.owners, list.limits, list.backend, w);
 }
 
 #[inline(always)]
-fn descend<T: Number, const N: usize>(parts: &Parts<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
-    let mut real = RealGains::<T, N>::new(parts);
-    minimise(&mut real, list.tasks, list.owners, list.limits, list.means, w);
+fn descend<T: Number, const N: usize>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+    let mut real = RealGains::<T, N>::new(coefficients);
+    minimise(&mut real, list.tasks, list.owners, list.limits, list.backend, w);
     if !T::SINGLE && list.kind == Kind::Certified {
-        certify(&mut real, list.tasks, list.owners, list.means, w);
+        certify(&mut real, list.tasks, list.owners, list.backend, w);
     }
 }
 
@@ -219,7 +223,7 @@ fn certify<T: Number, const N: usize>(
     real: &mut RealGains<T, N>,
     tasks: &mut Tasks,
     owners: &[Owner],
-    means: Means,
+    backend: Backend,
     w: &mut Workspace<T>,
 ) {
     let width = real.width();
@@ -239,7 +243,7 @@ fn certify<T: Number, const N: usize>(
         w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian);
         let largest = w.layout.largest(&w.hessian);
         let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
-        let (definite, _) = factorise(&w.hessian, allowance, &w.layout, means, &mut w.factor);
+        let (definite, _) = factorise(&w.hessian, allowance, &w.layout, backend, &mut w.factor);
         let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
         for task in first..last {
             if proved >> (task - first) & 1 == 1 {

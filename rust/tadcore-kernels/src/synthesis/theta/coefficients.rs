@@ -4,7 +4,7 @@ use crate::simd::Scalar;
 
 /// The numbers of one instant: F, M, W and R are those of the paper's problem at that instant.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Parts<S> {
+pub struct Coefficients<S> {
     /// N.
     pub size: usize,
     /// m.
@@ -48,13 +48,13 @@ pub struct Scale {
 /// One problem in both precisions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Precisions {
-    pub double: Parts<f64>,
+    pub double: Coefficients<f64>,
     /// In single precision, where that can hold it.
-    pub single: Option<Parts<f32>>,
+    pub single: Option<Coefficients<f32>>,
 }
 
-impl From<Parts<f64>> for Precisions {
-    fn from(double: Parts<f64>) -> Self {
+impl From<Coefficients<f64>> for Precisions {
+    fn from(double: Coefficients<f64>) -> Self {
         let single = double.in_range().then(|| double.rounded());
         Self { double, single }
     }
@@ -63,7 +63,7 @@ impl From<Parts<f64>> for Precisions {
 /// Sizes between which sums of squares and their roundings are numbers of single precision.
 const RANGE: (f64, f64) = (1e-9, 1e12);
 
-impl Parts<f64> {
+impl Coefficients<f64> {
     /// Whether Θ and gains of the size of F, their gradients and curvatures lie well within single precision.
     pub fn in_range(&self) -> bool {
         let within = |x: f64| RANGE.0 <= x && x <= RANGE.1;
@@ -72,9 +72,9 @@ impl Parts<f64> {
     }
 
     /// Every number rounded.
-    pub fn rounded(&self) -> Parts<f32> {
+    pub fn rounded(&self) -> Coefficients<f32> {
         let all = |numbers: &[f64]| numbers.iter().map(|&x| f32::of(x)).collect();
-        Parts {
+        Coefficients {
             size: self.size,
             rows: self.rows,
             first: f32::of(self.first),

@@ -1,4 +1,4 @@
-//! Θ over twice as many gains, in two ways side by side: the second look and the third.
+//! Θ over twice as many gains, in two ways side by side, for the search's restarts.
 //!
 //! **Complex gains** G = A + iB. The paper's gains are 2 × 2 blocks; those that commute with rotations, aI + bJ, act like
 //! the numbers a + ib. With the Hermitian forms X = GᴴRG − M and E_p = W_pΔ + (W_pΔ)ᴴ, Θ keeps its shape and its real
@@ -17,14 +17,14 @@
 //!
 //! The vector is laid out A first, then B, m × N each.
 
-use super::coefficients::Parts;
+use super::coefficients::Coefficients;
 use super::real::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
 use crate::simd::{Number, dot, norm, sum_of_squares, take};
 use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over doubled gains.
 pub struct Doubled<'a, T: Number, const N: usize> {
-    problem: &'a Parts<T::Scalar>,
+    problem: &'a Coefficients<T::Scalar>,
     /// s: 1 for complex gains, 0 for stacked ones.
     complex: T,
     /// σ.
@@ -44,7 +44,7 @@ pub struct Doubled<'a, T: Number, const N: usize> {
 
 impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
     #[inline(always)]
-    pub fn new(problem: &'a Parts<T::Scalar>) -> Self {
+    pub fn new(problem: &'a Coefficients<T::Scalar>) -> Self {
         let (n, m, groups) = (problem.size, problem.rows, problem.coupling.len());
         let zero = T::splat(0.0);
         Self {

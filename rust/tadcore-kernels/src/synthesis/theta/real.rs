@@ -12,13 +12,13 @@
 //! form is positive semidefinite on the variables, G* is a *global* minimiser. It is the Hessian without its
 //! Gauss–Newton part: one more factorisation proves what no number of restarts can.
 
-use super::coefficients::Parts;
+use super::coefficients::Coefficients;
 use crate::simd::{Number, Scalar, dot, norm, sum_of_squares, take};
 use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over gains, for one network or several side by side. `N` is the size, 0 when it is known only at run time.
 pub struct RealGains<'a, T: Number, const N: usize> {
-    problem: &'a Parts<T::Scalar>,
+    problem: &'a Coefficients<T::Scalar>,
     /// X at the point last evaluated, N × N.
     x: Vec<T>,
     /// X at the point kept for the Hessian.
@@ -33,7 +33,7 @@ pub struct RealGains<'a, T: Number, const N: usize> {
 
 impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
     #[inline(always)]
-    pub fn new(problem: &'a Parts<T::Scalar>) -> Self {
+    pub fn new(problem: &'a Coefficients<T::Scalar>) -> Self {
         let (n, m) = (problem.size, problem.rows);
         let zero = T::splat(0.0);
         Self {

@@ -1,35 +1,35 @@
-//! A network that is being solved: its variables, the best gains found so far, and the look that found them.
+//! A network that is being solved: its variables, the best gains found so far, and the start that led to them.
 
 use crate::simd::norm;
-use crate::synthesis::newton::{Owner, Reached, Rival, Variable};
+use crate::synthesis::newton::{Incumbent, Owner, Reached, Variable};
 
-/// The look that won.
+/// The start whose descent won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
+pub enum Start {
     /// Newton from the canonical start.
     Canonical,
-    /// The second look, in complex gains.
+    /// The end of a descent in complex gains.
     Complex,
-    /// The third look, in stacked gains.
+    /// The end of a descent in stacked gains.
     Stacked,
-    /// The last look, with rows reversed or left out.
+    /// The best gains with rows reversed, or the canonical start with a row left out.
     Reversed,
 }
 
 /// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as
 /// small makes no other points of A + B and A − B.
 pub(crate) const BACK: f64 = 1e-3;
-/// How much lower, relatively, a look must be to win.
+/// How much lower, relatively, a restart must lead to win.
 const TIE: f64 = 1e-9;
 
 /// One network at the instant: its variables, and the best gains found so far.
 #[derive(Debug)]
-pub(crate) struct Entry {
+pub(crate) struct Candidate {
     pub variables: Vec<Variable>,
-    pub start: Vec<f64>,
+    pub initial: Vec<f64>,
     pub g: Vec<f64>,
     pub reached: Reached,
-    pub look: Look,
+    pub start: Start,
     pub certified: bool,
     /// Iterations of all descents together.
     pub iterations: usize,
@@ -37,15 +37,15 @@ pub(crate) struct Entry {
     pub quick: bool,
 }
 
-impl Entry {
+impl Candidate {
     /// A network that starts from `start`.
     pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
         Self {
             variables,
             g: start.clone(),
-            start,
+            initial: start,
             reached: Reached::default(),
-            look: Look::Canonical,
+            start: Start::Canonical,
             certified: false,
             iterations: 0,
             quick: false,
@@ -53,22 +53,22 @@ impl Entry {
     }
 
     pub(crate) fn owner(&self) -> Owner<'_> {
-        let rival = Rival { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
-        Owner { variables: &self.variables, rival: self.quick.then_some(rival) }
+        let incumbent = Incumbent { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
+        Owner { variables: &self.variables, incumbent: self.quick.then_some(incumbent) }
     }
 
-    /// Keeps what a descent of `look` reached.
-    pub(crate) fn take(&mut self, look: Look, g: &[f64], reached: Reached) {
+    /// Keeps what a descent of `start` reached.
+    pub(crate) fn take(&mut self, start: Start, g: &[f64], reached: Reached) {
         self.g.copy_from_slice(g);
-        (self.reached, self.look) = (reached, look);
+        (self.reached, self.start) = (reached, start);
     }
 
-    /// Keeps what a descent of a further look reached when it is lower; says whether it is.
-    pub(crate) fn offer(&mut self, look: Look, g: &[f64], reached: Reached) -> bool {
+    /// Keeps what a restart reached when it is lower; says whether it is.
+    pub(crate) fn offer(&mut self, start: Start, g: &[f64], reached: Reached) -> bool {
         self.iterations += reached.iterations;
         let lower = reached.value < self.reached.value - TIE * self.reached.value.abs();
         if lower {
-            self.take(look, g, reached);
+            self.take(start, g, reached);
         }
         lower
     }

@@ -3,7 +3,7 @@
 //! The variables are the paper's K_{d_i} (and K_τ): the gain on z_j − z_i for each player seen and on z_i when the
 //! attacker is seen, so the gradient is the printed one (eq:errgradient). Steps follow the negative gradient; their
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
-//! starts canonically, ends at a stationary point near its start, and does not look further.
+//! starts canonically, ends at a stationary point near its start, and does not restart.
 
 use crate::simd::norm;
 use crate::synthesis::newton::{Layout, Limits, Objective, Reached, Variable};

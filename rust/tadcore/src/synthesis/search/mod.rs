@@ -1,22 +1,22 @@
 //! From the canonical start to the global minimum: which descents are made, and when no more are needed.
 //!
-//! 1. Newton from the canonical start. Most entries end here: the certificate of `theta` proves the
-//!    minimum global (of random networks, about four in five at n = 3 and three in five at n = 5).
-//! 2. Otherwise a second look in complex gains and a third in stacked gains, both from the canonical start with a fixed
-//!    pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes back
-//!    to the real gains A, A + B and A − B, from where Newton finishes; so it does from the canonical start without one
-//!    row at a time.
-//! 3. A last look: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG does
-//!    not see the sign of a row, so minima come in families that differ by signs.
+//! 1. Newton from the canonical start. Most networks end here: the certificate of `theta` proves the minimum global (of
+//!    random networks, about four in five at n = 3 and three in five at n = 5).
+//! 2. Otherwise two restarts: a descent in complex gains and one in stacked gains, both from the canonical start with a
+//!    fixed pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes
+//!    back to the real gains A, A + B and A − B, from where Newton finishes; so it does from the canonical start
+//!    without one row at a time.
+//! 3. Further restarts: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG
+//!    does not see the sign of a row, so minima come in families that differ by signs.
 //!
-//! Most descents of the further looks lead back to the best point or to a higher one. Where descents go side by side
-//! they are made in single precision first, twice as many to a register, and what that leaves undecided goes on in
-//! double from there; doubled gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
+//! Most restarts lead back to the best point or to a higher one. Where descents go side by side they are made in single
+//! precision first, twice as many to a register, and what that leaves undecided goes on in double from there; doubled
+//! gains stay in single precision. No gain, no Θ and no certificate comes from single precision.
 //!
-//! The lowest Θ is kept; a look must win by more than rounding, so ties go to the earliest. The networks of one instant
-//! go through these stages together, their descents side by side; the rival that lets a descent end early is the best
-//! point before its stage, so no network's answer depends on which others were asked for. Everything here is a
-//! function of (t_k, topology) alone. How often each look is needed: `docs/decisions/0003-synthesis.md`.
+//! The lowest Θ is kept; a restart must win by more than rounding, so ties go to the earliest. The networks of one
+//! instant go through these stages together, their descents side by side; the incumbent that lets a descent end early
+//! is the best point before its stage, so no network's answer depends on which others were asked for. Everything here
+//! is a function of (t_k, topology) alone. How often each stage is needed: `docs/decisions/0003-synthesis.md`.
 //!
 //! In this order, each file using those above it:
 //!
@@ -33,14 +33,14 @@ mod gradient;
 mod stages;
 mod start;
 
-pub(crate) use candidate::Entry;
-pub use candidate::Look;
+pub(crate) use candidate::Candidate;
+pub use candidate::Start;
 #[cfg(test)]
 pub(crate) use dispatch::Kind;
-pub(crate) use dispatch::{Engine, SIDE_BY_SIDE_UP_TO};
+pub(crate) use dispatch::{Dispatcher, SIDE_BY_SIDE_UP_TO};
 pub(crate) use gradient::descend;
 pub(crate) use stages::Search;
 #[cfg(test)]
-pub(crate) use stages::{BASIN, LONGEST_STEP, LOOK_ITERATIONS, far_start};
+pub(crate) use stages::{BASIN, DOUBLED_ITERATIONS, LONGEST_STEP, far_start};
 pub(crate) use start::{canonical, paper_variables, variables};
 pub(crate) use tadcore_kernels::synthesis::search::dispatch;

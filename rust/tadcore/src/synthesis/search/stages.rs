@@ -1,21 +1,21 @@
 //! The stages of the search for one list of networks; [`super`] says what they are.
 
-use super::candidate::{BACK, Entry, Look};
-use super::dispatch::{self, Engine, Kind};
+use super::candidate::{BACK, Candidate, Start};
+use super::dispatch::{self, Dispatcher, Kind};
 use crate::simd::norm;
 use crate::synthesis::newton::{Limits, Owner, Tasks, advance, balance};
 use crate::synthesis::theta::Problem;
 
 /// Size of the second part B at the start, relative to ‖F‖.
 const FAR: f64 = 1.0;
-/// Longest step of a second or third look, relative to ‖F‖: no jump from basin to basin.
+/// Longest step in doubled gains, relative to ‖F‖: no jump from basin to basin.
 pub(crate) const LONGEST_STEP: f64 = 0.3;
-/// Relative gradient at which a second or third look has found its basin.
+/// Relative gradient at which a descent in doubled gains has found its basin.
 pub(crate) const BASIN: f64 = 1e-4;
-/// Steps of a second or third look.
-pub(crate) const LOOK_ITERATIONS: usize = 300;
+/// Steps of a descent in doubled gains.
+pub(crate) const DOUBLED_ITERATIONS: usize = 300;
 /// Steps of a descent in single precision, and the relative gradient at which it is left undecided.
-const SCOUT_ITERATIONS: usize = 60;
+const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
 /// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
 const PAIRS_UP_TO: usize = 8;
@@ -27,117 +27,124 @@ const QUICK: usize = 30;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
 
-/// What a search needs besides its entries.
+/// What a search needs besides its candidates.
 pub(crate) struct Search<'a> {
     pub problem: &'a Problem,
     pub limits: Limits,
-    pub engine: &'a mut Engine,
+    pub dispatcher: &'a mut Dispatcher,
     pub tasks: &'a mut Tasks,
     /// A list to spare: descents in doubled gains when they are done, and those in single precision.
     pub doubled: &'a mut Tasks,
 }
 
 impl Search<'_> {
-    /// Finds the global minimum of Θ for every entry.
-    pub(crate) fn run(&mut self, entries: &mut [Entry]) {
-        self.start(1);
-        for (e, entry) in entries.iter().enumerate() {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&entry.start);
+    /// Finds the global minimum of Θ for every candidate.
+    pub(crate) fn run(&mut self, candidates: &mut [Candidate]) {
+        self.begin(1);
+        for (e, candidate) in candidates.iter().enumerate() {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&candidate.initial);
         }
-        self.descend(Kind::Certified, entries);
-        for (task, entry) in entries.iter_mut().enumerate() {
+        self.descend(Kind::Certified, candidates);
+        for (task, candidate) in candidates.iter_mut().enumerate() {
             let reached = self.tasks.reached(task);
-            entry.take(Look::Canonical, self.tasks.point(task), reached);
-            entry.iterations = reached.iterations;
-            entry.certified = self.tasks.certified(task);
-            entry.quick = entry.iterations <= QUICK;
+            candidate.take(Start::Canonical, self.tasks.point(task), reached);
+            candidate.iterations = reached.iterations;
+            candidate.certified = self.tasks.certified(task);
+            candidate.quick = candidate.iterations <= QUICK;
         }
-        let open: Vec<usize> = (0..entries.len()).filter(|&e| !entries[e].certified).collect();
+        let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].certified).collect();
         if !open.is_empty() {
-            self.look_further(entries, &open);
+            self.restart(candidates, &open);
         }
-        self.polish(entries);
+        self.polish(candidates);
     }
 
-    /// Everything beyond the first descent, for the entries `open`.
-    fn look_further(&mut self, entries: &mut [Entry], open: &[usize]) {
-        let looks = self.double(entries, open);
-        self.finish(entries, looks);
+    /// Everything beyond the first descent, for the candidates `open`.
+    fn restart(&mut self, candidates: &mut [Candidate], open: &[usize]) {
+        let starts = self.double(candidates, open);
+        self.finish(candidates, starts);
         let mut lower = open.to_vec();
         for _ in 0..ROUNDS {
-            self.start(1);
+            self.begin(1);
             for &e in &lower {
-                self.reverse(e, &entries[e].g);
+                self.reverse(e, &candidates[e].g);
             }
-            let looks = vec![Look::Reversed; self.tasks.len()];
-            lower = self.finish(entries, looks);
+            let starts = vec![Start::Reversed; self.tasks.len()];
+            lower = self.finish(candidates, starts);
             if lower.is_empty() {
                 break;
             }
         }
-        // Where a later look won there is another point to be tried for the certificate.
-        let won: Vec<usize> = open.iter().copied().filter(|&e| entries[e].look != Look::Canonical).collect();
-        self.certify(entries, &won);
+        // Where a restart won there is another point to be tried for the certificate.
+        let won: Vec<usize> = open.iter().copied().filter(|&e| candidates[e].start != Start::Canonical).collect();
+        self.certify(candidates, &won);
     }
 
     /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
     /// long as the gradient falls.
-    fn polish(&mut self, entries: &mut [Entry]) {
-        self.start(1);
-        for (e, entry) in entries.iter().enumerate().filter(|(_, entry)| !entry.quick) {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&entry.g);
+    fn polish(&mut self, candidates: &mut [Candidate]) {
+        self.begin(1);
+        for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| !candidate.quick) {
+            self.tasks.add(e, false, 0.0).copy_from_slice(&candidate.g);
         }
         if self.tasks.len() == 0 {
             return;
         }
         let limits = self.limits;
         self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
-        self.descend(Kind::Real, entries);
+        self.descend(Kind::Real, candidates);
         self.limits = limits;
         for task in 0..self.tasks.len() {
-            let (entry, reached) = (&mut entries[self.tasks.owner(task)], self.tasks.reached(task));
-            entry.iterations += reached.iterations;
-            if reached.gradient_norm < entry.reached.gradient_norm {
-                entry.take(entry.look, self.tasks.point(task), reached);
+            let (candidate, reached) = (&mut candidates[self.tasks.owner(task)], self.tasks.reached(task));
+            candidate.iterations += reached.iterations;
+            if reached.gradient_norm < candidate.reached.gradient_norm {
+                candidate.take(candidate.start, self.tasks.point(task), reached);
             }
         }
     }
 
     /// Empties the list for points of as many copies of the gains.
-    fn start(&mut self, copies: usize) {
+    fn begin(&mut self, copies: usize) {
         self.tasks.clear(self.problem.rows * self.problem.size, copies);
     }
 
-    /// Makes the listed descents, without rivals.
-    fn descend(&mut self, kind: Kind, entries: &[Entry]) {
-        let owners: Vec<Owner> = entries.iter().map(|e| Owner { variables: &e.variables, rival: None }).collect();
-        self.engine.run(kind, &self.problem.theta, self.tasks, &owners, self.limits);
+    /// Makes the listed descents, without incumbents.
+    fn descend(&mut self, kind: Kind, candidates: &[Candidate]) {
+        let owners: Vec<Owner> =
+            candidates.iter().map(|e| Owner { variables: &e.variables, incumbent: None }).collect();
+        self.dispatcher.run(kind, &self.problem.theta, self.tasks, &owners, self.limits);
     }
 
-    /// Descends in doubled gains, and lists the starts that come of it and those without one row: the look of each.
-    fn double(&mut self, entries: &mut [Entry], open: &[usize]) -> Vec<Look> {
+    /// Descends in doubled gains, and lists the restarts that come of it and those without one row; the kind of start
+    /// of each.
+    fn double(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Vec<Start> {
         let (n, m) = (self.problem.size, self.problem.rows);
         let scale = self.problem.theta.double.scale.fne;
-        self.start(2);
+        self.begin(2);
         for &e in open {
             for complex in [true, false] {
-                far_start(&entries[e], scale, self.tasks.add(e, complex, entries[e].reached.scale));
+                far_start(&candidates[e], scale, self.tasks.add(e, complex, candidates[e].reached.scale));
             }
         }
         let limits = std::mem::replace(
             &mut self.limits,
-            Limits { iterations: LOOK_ITERATIONS, tolerance: BASIN, acceptable: BASIN, longest: LONGEST_STEP * scale },
+            Limits {
+                iterations: DOUBLED_ITERATIONS,
+                tolerance: BASIN,
+                acceptable: BASIN,
+                longest: LONGEST_STEP * scale,
+            },
         );
-        self.descend(Kind::Doubled, entries);
+        self.descend(Kind::Doubled, candidates);
         self.limits = limits;
 
         let doubled = std::mem::replace(self.tasks, std::mem::take(self.doubled));
-        self.start(1);
-        let mut looks = Vec::new();
+        self.begin(1);
+        let mut starts = Vec::new();
         for task in 0..doubled.len() {
             let e = doubled.owner(task);
-            entries[e].iterations += doubled.reached(task).iterations;
-            let look = if doubled.kind(task).0 { Look::Complex } else { Look::Stacked };
+            candidates[e].iterations += doubled.reached(task).iterations;
+            let start = if doubled.kind(task).0 { Start::Complex } else { Start::Stacked };
             let (a, b) = doubled.point(task).split_at(m * n);
             let signs = if norm(b) <= BACK * norm(a) { &[0.0][..] } else { &[0.0, 1.0, -1.0] };
             for &sign in signs {
@@ -145,68 +152,69 @@ impl Search<'_> {
                 for (x, (a, b)) in point.iter_mut().zip(a.iter().zip(b)) {
                     *x = a + sign * b;
                 }
-                balance(point, &entries[e].variables);
-                looks.push(look);
+                balance(point, &candidates[e].variables);
+                starts.push(start);
             }
-            if look == Look::Stacked {
+            if start == Start::Stacked {
                 for i in 0..m {
-                    scale_rows(n, &entries[e].start, &[i], 0.0, self.tasks.add(e, false, 0.0));
-                    looks.push(Look::Reversed);
+                    scale_rows(n, &candidates[e].initial, &[i], 0.0, self.tasks.add(e, false, 0.0));
+                    starts.push(Start::Reversed);
                 }
             }
         }
         *self.doubled = doubled;
-        looks
+        starts
     }
 
     /// Drops the listed descents of which single precision already shows that they cannot get below the best point; the
     /// rest goes on from where it got.
-    fn scout(&mut self, entries: &mut [Entry], looks: &mut Vec<Look>) {
-        let (width, tasks, scouts) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
-        scouts.clear(width, 1);
-        for task in (0..tasks.len()).filter(|&task| entries[tasks.owner(task)].quick) {
-            scouts.add(tasks.owner(task), false, 0.0).copy_from_slice(tasks.point(task));
+    fn screen(&mut self, candidates: &mut [Candidate], starts: &mut Vec<Start>) {
+        let (width, tasks, screened) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
+        screened.clear(width, 1);
+        for task in (0..tasks.len()).filter(|&task| candidates[tasks.owner(task)].quick) {
+            screened.add(tasks.owner(task), false, 0.0).copy_from_slice(tasks.point(task));
         }
-        let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
-        let limits = Limits { iterations: SCOUT_ITERATIONS, tolerance: FLAT, acceptable: FLAT, ..self.limits };
-        self.engine.run(Kind::Scout, &self.problem.theta, scouts, &owners, limits);
-        let mut scout = 0..scouts.len();
+        let owners: Vec<Owner> = candidates.iter().map(Candidate::owner).collect();
+        let limits = Limits { iterations: SCREENING_ITERATIONS, tolerance: FLAT, acceptable: FLAT, ..self.limits };
+        self.dispatcher.run(Kind::Screening, &self.problem.theta, screened, &owners, limits);
+        let mut next = 0..screened.len();
         let keep: Vec<bool> = (0..tasks.len())
             .map(|task| {
-                let entry = &mut entries[tasks.owner(task)];
-                let Some(scout) = entry.quick.then(|| scout.next()).flatten() else {
+                let candidate = &mut candidates[tasks.owner(task)];
+                let Some(descent) = candidate.quick.then(|| next.next()).flatten() else {
                     return true;
                 };
-                entry.iterations += scouts.reached(scout).iterations;
+                candidate.iterations += screened.reached(descent).iterations;
                 let point = tasks.point_mut(task);
-                point.copy_from_slice(scouts.point(scout));
-                balance(point, &entry.variables);
-                !scouts.settled(scout)
+                point.copy_from_slice(screened.point(descent));
+                balance(point, &candidate.variables);
+                !screened.pruned(descent)
             })
             .collect();
         tasks.retain(&keep);
         let mut keep = keep.iter();
-        looks.retain(|_| *keep.next().unwrap_or(&true));
+        starts.retain(|_| *keep.next().unwrap_or(&true));
     }
 
-    /// Makes the listed descents and keeps what is lower; which entries that changed.
-    fn finish(&mut self, entries: &mut [Entry], mut looks: Vec<Look>) -> Vec<usize> {
+    /// Makes the listed descents and keeps what is lower; which candidates that changed.
+    fn finish(&mut self, candidates: &mut [Candidate], mut starts: Vec<Start>) -> Vec<usize> {
         if dispatch::single(&self.problem.theta) {
-            self.scout(entries, &mut looks);
+            self.screen(candidates, &mut starts);
         }
-        let owners: Vec<Owner> = entries.iter().map(Entry::owner).collect();
-        self.engine.run(Kind::Real, &self.problem.theta, self.tasks, &owners, self.limits);
+        let owners: Vec<Owner> = candidates.iter().map(Candidate::owner).collect();
+        self.dispatcher.run(Kind::Real, &self.problem.theta, self.tasks, &owners, self.limits);
         let mut lower = Vec::new();
-        for (task, look) in looks.into_iter().enumerate() {
+        for (task, start) in starts.into_iter().enumerate() {
             let e = self.tasks.owner(task);
-            if entries[e].offer(look, self.tasks.point(task), self.tasks.reached(task)) && lower.last() != Some(&e) {
+            if candidates[e].offer(start, self.tasks.point(task), self.tasks.reached(task)) && lower.last() != Some(&e)
+            {
                 lower.push(e);
             }
         }
         lower
     }
 
-    /// Lists the point `g` of an entry with one row or two rows reversed.
+    /// Lists the point `g` of a candidate with one row or two rows reversed.
     fn reverse(&mut self, e: usize, g: &[f64]) {
         let (n, m) = (self.problem.size, self.problem.rows);
         let used: Vec<usize> = (0..m).filter(|&i| g[i * n..(i + 1) * n].iter().any(|&x| x != 0.0)).collect();
@@ -221,20 +229,20 @@ impl Search<'_> {
     }
 
     /// Tries the certificate at the best point of each of `which`.
-    pub(crate) fn certify(&mut self, entries: &mut [Entry], which: &[usize]) {
+    pub(crate) fn certify(&mut self, candidates: &mut [Candidate], which: &[usize]) {
         if which.is_empty() {
             return;
         }
-        self.start(1);
+        self.begin(1);
         for &e in which {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&entries[e].g);
+            self.tasks.add(e, false, 0.0).copy_from_slice(&candidates[e].g);
         }
         let limits = self.limits;
         self.limits.iterations = 0;
-        self.descend(Kind::Certified, entries);
+        self.descend(Kind::Certified, candidates);
         self.limits = limits;
         for task in 0..self.tasks.len() {
-            entries[self.tasks.owner(task)].certified = self.tasks.certified(task);
+            candidates[self.tasks.owner(task)].certified = self.tasks.certified(task);
         }
     }
 }
@@ -249,11 +257,11 @@ fn scale_rows(n: usize, from: &[f64], rows: &[usize], factor: f64, out: &mut [f6
 
 /// Writes the canonical start with a second part B along the variables, in a fixed pattern as large as the gains F and
 /// without symmetry: the golden angle spreads it.
-pub(crate) fn far_start(entry: &Entry, scale: f64, out: &mut [f64]) {
-    let (a, b) = out.split_at_mut(entry.start.len());
-    a.copy_from_slice(&entry.start);
-    let unknowns = entry.variables.len();
+pub(crate) fn far_start(candidate: &Candidate, scale: f64, out: &mut [f64]) {
+    let (a, b) = out.split_at_mut(candidate.initial.len());
+    a.copy_from_slice(&candidate.initial);
+    let unknowns = candidate.variables.len();
     let size = FAR * scale / (unknowns as f64).sqrt();
     let pattern: Vec<f64> = (0..unknowns).map(|v| size * (1.0 + 2.399_963_229_728_653 * v as f64).cos()).collect();
-    advance(b, &entry.variables, &pattern);
+    advance(b, &candidate.variables, &pattern);
 }

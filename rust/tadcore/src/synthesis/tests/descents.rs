@@ -1,12 +1,12 @@
 //! Single descents: the damping of each step on quadratic functions, where closed forms say what it is, and how early a
-//! descent ends that has a rival.
+//! descent ends that has an incumbent.
 
-use super::super::newton::{Form, Means, Owner, Reached, Rival, Slot, Workspace, advance, minimise};
+use super::super::newton::{Backend, Form, Incumbent, Owner, Reached, Slot, Workspace, advance, minimise};
 use super::super::search::{canonical, variables};
 use super::*;
 use crate::simd::norm;
 
-pub(super) const MEANS: Means = Means { library: false, width: Width::Baseline };
+pub(super) const BACKEND: Backend = Backend { library: false, width: Width::Baseline };
 pub(super) const LIMITS: Limits =
     Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
 
@@ -57,13 +57,13 @@ pub(super) fn descend(
     objective: &mut impl Objective<f64>,
     start: &[f64],
     variables: &[Variable],
-    rival: Option<Rival>,
+    incumbent: Option<Incumbent>,
     limits: Limits,
 ) -> (Vec<f64>, Reached) {
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(start);
-    minimise(objective, &mut tasks, &[Owner { variables, rival }], limits, MEANS, &mut Workspace::default());
+    minimise(objective, &mut tasks, &[Owner { variables, incumbent }], limits, BACKEND, &mut Workspace::default());
     (tasks.point(0).to_vec(), tasks.reached(0))
 }
 
@@ -114,8 +114,8 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
     }
 }
 
-/// No Θ is negative, so nothing gets below a rival of −1; a descent is to notice that before it has converged. Below
-/// one that is higher than the end, by however little, it is to get.
+/// No Θ is negative, so nothing gets below an incumbent of −1; a descent is to notice that before it has converged.
+/// Below one that is higher than the end, by however little, it is to get.
 #[test]
 fn a_descent_ends_early_only_where_it_cannot_win() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
@@ -124,8 +124,8 @@ fn a_descent_ends_early_only_where_it_cannot_win() {
         let (end, alone) = descend(&mut real, g, variables, None, LIMITS);
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let mut beside = |value| {
-            let rival = Rival { g: &far, value, near: 1e-3 };
-            descend(&mut real, g, variables, Some(rival), LIMITS)
+            let incumbent = Incumbent { g: &far, value, near: 1e-3 };
+            descend(&mut real, g, variables, Some(incumbent), LIMITS)
         };
         let (_, lost) = beside(-1.0);
         assert!(lost.iterations <= alone.iterations && lost.value >= alone.value * (1.0 - 1e-12));
@@ -143,8 +143,8 @@ fn a_descent_ends_early_only_where_it_cannot_win() {
     assert!(saved >= descents, "{saved} of {steps} steps in {descents} descents");
 }
 
-/// Near a rival that is no higher a descent has come back to it, and ends there before it has converged; as far from it
-/// as its reflection is, with the same Θ, it has not.
+/// Near an incumbent that is no higher a descent has come back to it, and ends there before it has converged; as far
+/// from it as its reflection is, with the same Θ, it has not.
 #[test]
 fn a_descent_ends_where_it_is_back() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
@@ -159,14 +159,14 @@ fn a_descent_ends_where_it_is_back() {
         if near == 0.0 || norm(&difference(&end, &best)) > 1e-6 * norm(&best) {
             return;
         }
-        let rival = Rival { g: &best, value: found.value * (1.0 - 1e-9), near };
-        let (back, early) = descend(&mut real, &off, variables, Some(rival), LIMITS);
+        let incumbent = Incumbent { g: &best, value: found.value * (1.0 - 1e-9), near };
+        let (back, early) = descend(&mut real, &off, variables, Some(incumbent), LIMITS);
         assert!(norm(&difference(&back, &best)) <= near && early.iterations <= alone.iterations);
         (steps, saved) = (steps + alone.iterations, saved + alone.iterations - early.iterations);
         descents += 1;
         let reflected: Vec<f64> = best.iter().map(|x| -x).collect();
-        let rival = Rival { g: &reflected, ..rival };
-        let (far, late) = descend(&mut real, &off, variables, Some(rival), LIMITS);
+        let incumbent = Incumbent { g: &reflected, ..incumbent };
+        let (far, late) = descend(&mut real, &off, variables, Some(incumbent), LIMITS);
         assert!(late.iterations >= early.iterations && norm(&difference(&far, &best)) <= near);
     });
     assert!(descents > 50 && saved >= descents, "{saved} of {steps} steps in {descents} descents");

@@ -1,46 +1,59 @@
-//! Looks in single precision: what they leave out must be nothing, and what they cannot decide is decided in double.
+//! Screening in single precision: what it prunes must be nothing, and what it cannot decide is decided in double.
 
-use super::super::newton::{Owner, Rival, Workspace, balance, minimise};
+use super::super::newton::{Incumbent, Owner, Workspace, balance, minimise};
 use super::super::search::variables;
-use super::descents::{LIMITS, MEANS, descend, each};
+use super::descents::{BACKEND, LIMITS, descend, each};
 use super::*;
 use crate::simd::norm;
 
-/// Whether single precision settles a descent from `start` beside a rival, and in how many steps it ends.
-fn scout(problem: &Problem, variables: &[Variable], start: &[f64], rival: Rival, iterations: usize) -> (bool, usize) {
-    let parts = problem.theta.single.as_ref().expect("a problem in range");
+/// Whether single precision prunes a descent from `start` beside an incumbent, and in how many steps it ends.
+fn screen(
+    problem: &Problem,
+    variables: &[Variable],
+    start: &[f64],
+    incumbent: Incumbent,
+    iterations: usize,
+) -> (bool, usize) {
+    let coefficients = problem.theta.single.as_ref().expect("a problem in range");
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
     tasks.add(0, false, 0.0).copy_from_slice(start);
-    let owners = [Owner { variables, rival: Some(rival) }];
+    let owners = [Owner { variables, incumbent: Some(incumbent) }];
     let limits = Limits { iterations, tolerance: 1e-6, ..LIMITS };
-    minimise(&mut RealGains::<f32, 0>::new(parts), &mut tasks, &owners, limits, MEANS, &mut Workspace::default());
-    (tasks.settled(0), tasks.reached(0).iterations)
+    minimise(
+        &mut RealGains::<f32, 0>::new(coefficients),
+        &mut tasks,
+        &owners,
+        limits,
+        BACKEND,
+        &mut Workspace::default(),
+    );
+    (tasks.pruned(0), tasks.reached(0).iterations)
 }
 
-/// Of a descent that ends below its rival, by however little, nothing is settled; nor of one that comes back to it, which
-/// ends there early, since rounding hides which is lower. Far above its rival every one is settled, and many are a little
-/// above it.
+/// Of a descent that ends below its incumbent, by however little, nothing is pruned; nor of one that comes back to it,
+/// which ends there early, since rounding hides which is lower. Far above its incumbent every one is pruned, and many
+/// are a little above it.
 #[test]
-fn only_what_cannot_win_is_settled() {
+fn only_what_cannot_win_is_pruned() {
     let (mut count, mut saved, mut little) = (0, 0, 0);
     each(|problem, variables, g| {
         let (end, reached) = descend(&mut RealGains::<f64, 0>::new(&problem.theta.double), g, variables, None, LIMITS);
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let beside = |lower: f64| {
-            let rival = Rival { g: &far, value: reached.value * (1.0 - lower), near: 1e-3 };
-            scout(problem, variables, g, rival, 2_000)
+            let incumbent = Incumbent { g: &far, value: reached.value * (1.0 - lower), near: 1e-3 };
+            screen(problem, variables, g, incumbent, 2_000)
         };
         for higher in [1e-9, 1e-6, 1e-3, 0.1] {
             assert!(!beside(-higher).0, "{higher}");
         }
-        let below = Rival { g: &far, value: -1.0, near: 1e-3 };
-        assert!(scout(problem, variables, g, below, 2_000).0);
+        let below = Incumbent { g: &far, value: -1.0, near: 1e-3 };
+        assert!(screen(problem, variables, g, below, 2_000).0);
         // Nothing is known of a descent that only its limit stopped.
-        assert!(reached.iterations < 4 || !scout(problem, variables, g, below, 1).0);
-        let rival = Rival { g: &end, value: reached.value * (1.0 - 1e-9), near: 1e-3 * norm(&end) };
-        let (settled, steps) = scout(problem, variables, g, rival, 2_000);
-        assert!(!settled);
+        assert!(reached.iterations < 4 || !screen(problem, variables, g, below, 1).0);
+        let incumbent = Incumbent { g: &end, value: reached.value * (1.0 - 1e-9), near: 1e-3 * norm(&end) };
+        let (pruned, steps) = screen(problem, variables, g, incumbent, 2_000);
+        assert!(!pruned);
         saved += beside(-0.1).1.saturating_sub(steps);
         little += usize::from(beside(3e-3).0);
         count += usize::from(reached.iterations > 3);

@@ -11,7 +11,7 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
-use super::{Parts, Precisions, Scale};
+use super::{Coefficients, Precisions, Scale};
 use crate::game::{Game, Interaction};
 use crate::simd::{norm, sum_of_squares};
 
@@ -96,7 +96,8 @@ impl Problem {
         };
         let strength = r.iter().map(|r| 4.0 * gamma[0] * r).collect();
         let first = gamma[0];
-        let double = Parts { size, rows, first, strength, r, fne, target, coupling, closeness, quadratic, scale };
+        let double =
+            Coefficients { size, rows, first, strength, r, fne, target, coupling, closeness, quadratic, scale };
         Self { interaction, size, rows, gamma, theta: double.into() }
     }
 

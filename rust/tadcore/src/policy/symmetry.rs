@@ -1,32 +1,32 @@
-//! Players of one kind: topologies that differ by their names alone share one answer.
+//! Symmetry classes of players: topologies that differ by a relabelling of equal players share one answer.
 //!
-//! Defenders with the same weights may change places. A relabelling of them carries the gains of one topology into those
-//! of another, and the transition with them, so one synthesis serves all. Which one is solved, the *model*, is a
-//! function of the topology alone, whoever asks: defenders of a kind in the order of whom they see, then of colours.
-//! Between a topology and its model nothing is computed, numbers only change their places, so the answer has the same
-//! bits on every way there.
+//! Defenders with the same weights may change places. A relabelling of them carries the gains of one topology into
+//! those of another, and the transition with them, so one synthesis serves all. Which one is solved, the *canonical
+//! form*, is a function of the topology alone, whoever asks: defenders of a class in the order of whom they see, then
+//! of colours. Between a topology and its canonical form nothing is computed, numbers only change their places, so the
+//! answer has the same bits on every way there.
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
 //! | π | an order | player i of the relabelled game is player π(i) of the other |
 //!
-//! A colour is a number that a player keeps under every relabelling: whom it sees and by whom it is seen, and the colours
-//! of those (Weisfeiler and Leman). Players that differ and have one colour all the same keep their order: the
-//! topology then shares with fewer others, and is none the worse for it.
+//! Colour refinement (Weisfeiler and Leman): a colour is a number that a player keeps under every relabelling, made of
+//! whom it sees, by whom it is seen, and the colours of those. Players that differ and have one colour all the same
+//! keep their order: the topology then shares with fewer others, and is none the worse for it.
 
 use crate::game::Game;
 use crate::network::Topology;
 
-/// How often colours look at their neighbours'.
+/// Rounds of refinement.
 const ROUNDS: usize = 2;
 
 /// Which defenders are alike.
 #[derive(Debug)]
-pub(super) struct Kinds {
-    /// The first defender of the same kind, for every defender; the target is like nobody.
+pub(super) struct SymmetryClasses {
+    /// The first defender of the same class, for every defender; the target is like nobody.
     first: Vec<usize>,
     /// Whether any two are alike.
-    some: bool,
+    any: bool,
 }
 
 /// A player's marks under one topology.
@@ -45,7 +45,7 @@ fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-impl Kinds {
+impl SymmetryClasses {
     pub(super) fn of(game: &Game) -> Self {
         let w = game.weights();
         let same = |i: usize, j: usize| {
@@ -55,23 +55,24 @@ impl Kinds {
         };
         let first = |i: usize| if i == game.n() { i } else { (0..i).find(|&j| same(i, j)).unwrap_or(i) };
         let first: Vec<usize> = (0..game.size()).map(first).collect();
-        let some = first.iter().enumerate().any(|(i, &first)| first != i);
-        Self { first, some }
+        let any = first.iter().enumerate().any(|(i, &first)| first != i);
+        Self { first, any }
     }
 
     /// Whether any two defenders are alike.
-    pub(super) fn some(&self) -> bool {
-        self.some
+    pub(super) fn any(&self) -> bool {
+        self.any
     }
 
-    /// The model of a topology, and the order that leads to it.
-    pub(super) fn model(&self, topology: &Topology) -> (Topology, Vec<usize>) {
+    /// The canonical form of a topology, and the order that leads to it.
+    pub(super) fn canonical(&self, topology: &Topology) -> (Topology, Vec<usize>) {
         let mut order: Vec<usize> = (0..topology.size()).collect();
-        if !self.some {
+        if !self.any {
             return (topology.clone(), order);
         }
-        // The places of a kind go to its players, who sees most first: models that are alike are solved side by side, and
-        // lanes with the same unknowns waste none. By insertion: there are few, and equal ones are to keep their order.
+        // The places of a class go to its players, who sees most first: canonical forms that are alike are solved side
+        // by side, and lanes with the same unknowns waste none. By insertion: there are few, and equal ones are to keep
+        // their order.
         let players = self.players(topology);
         let key = |i: usize| (std::cmp::Reverse(players[i].sight), players[i].colour);
         for i in 1..topology.rows() {
@@ -115,7 +116,7 @@ impl Kinds {
     }
 }
 
-/// The rows of a model, each as wide as `order` is long, under their own names.
+/// The rows of a canonical form, each as wide as `order` is long, under their own names.
 pub(super) fn back(order: &[usize], rows: &[f64]) -> Vec<f64> {
     let n = order.len();
     let mut out = vec![0.0; rows.len()];
@@ -134,48 +135,48 @@ mod tests {
     use super::*;
     use crate::game::{Interaction, bank};
 
-    fn kinds(r_d: &[f64], q_ad: &[f64]) -> Vec<usize> {
+    fn classes(r_d: &[f64], q_ad: &[f64]) -> Vec<usize> {
         let base = bank::paper_game(Interaction::I2, 1.0).expect("the paper's game");
         let mut weights = base.weights().clone();
         weights.r_d = r_d.to_vec();
         weights.q_ad = q_ad.to_vec();
         weights.f_ad = vec![1.0; r_d.len()];
-        Kinds::of(&Game::new(Interaction::I2, weights, *base.grid()).expect("a valid game")).first
+        SymmetryClasses::of(&Game::new(Interaction::I2, weights, *base.grid()).expect("a valid game")).first
     }
 
     #[test]
     fn defenders_of_equal_weights_are_alike() {
-        assert_eq!(kinds(&[1.0], &[1.0]), [0, 1]);
-        assert_eq!(kinds(&[1.0; 3], &[1.0; 3]), [0, 0, 0, 3]);
-        assert_eq!(kinds(&[1.0, 2.0, 1.0, 2.0], &[1.0; 4]), [0, 1, 0, 1, 4]);
-        assert_eq!(kinds(&[1.0, 2.0, 1.0, 2.0], &[1.0, 1.0, 1.0, 3.0]), [0, 1, 0, 3, 4]);
+        assert_eq!(classes(&[1.0], &[1.0]), [0, 1]);
+        assert_eq!(classes(&[1.0; 3], &[1.0; 3]), [0, 0, 0, 3]);
+        assert_eq!(classes(&[1.0, 2.0, 1.0, 2.0], &[1.0; 4]), [0, 1, 0, 1, 4]);
+        assert_eq!(classes(&[1.0, 2.0, 1.0, 2.0], &[1.0, 1.0, 1.0, 3.0]), [0, 1, 0, 3, 4]);
     }
 
-    /// How many models the networks have whose keys are multiples of `stride`, and how many classes under the
+    /// How many canonical forms the networks have whose keys are multiples of `stride`, and how many classes under the
     /// relabellings `orders`.
     fn count<const N: usize>(first: [usize; N], rows: usize, stride: usize, orders: &[[usize; N]]) -> [usize; 2] {
-        let kinds = Kinds { first: first.to_vec(), some: true };
-        let (mut models, mut classes) = (BTreeSet::new(), BTreeSet::new());
+        let classes = SymmetryClasses { first: first.to_vec(), any: true };
+        let (mut canonical_forms, mut orbits) = (BTreeSet::new(), BTreeSet::new());
         for key in (0..1u64 << (rows * N)).step_by(stride) {
             let topology = Topology::from_key(rows, N, key);
-            let (model, order) = kinds.model(&topology);
-            assert_eq!(topology.relabelled(&order), model);
+            let (canonical, order) = classes.canonical(&topology);
+            assert_eq!(topology.relabelled(&order), canonical);
             assert!(orders.iter().any(|other| other[..] == order));
-            models.insert(model);
-            classes.insert(orders.iter().map(|order| topology.relabelled(order)).min());
+            canonical_forms.insert(canonical);
+            orbits.insert(orders.iter().map(|order| topology.relabelled(order)).min());
         }
-        [models.len(), classes.len()]
+        [canonical_forms.len(), orbits.len()]
     }
 
-    /// All networks of three defenders, and many of four of two kinds. Where three see each other in a circle they have one
-    /// colour, and its two directions stay apart: with the attacker seen or not, the target seen or not, four classes
-    /// have two models.
+    /// All networks of three defenders, and many of four of two classes. Where three see each other in a circle they
+    /// have one colour, and its two directions stay apart: with the attacker seen or not, the target seen or not, four
+    /// classes have two canonical forms.
     #[test]
-    fn relabelled_networks_have_one_model() {
+    fn relabelled_networks_have_one_canonical_form() {
         let orders = [[0, 1, 2, 3], [0, 2, 1, 3], [1, 0, 2, 3], [1, 2, 0, 3], [2, 0, 1, 3], [2, 1, 0, 3]];
         assert_eq!(count([0, 0, 0, 3], 3, 1, &orders), [756, 752]);
         let orders = [[0, 1, 2, 3, 4], [2, 1, 0, 3, 4], [0, 3, 2, 1, 4], [2, 3, 0, 1, 4]];
-        let [models, classes] = count([0, 1, 0, 1, 4], 5, 1471, &orders);
-        assert_eq!(models, classes);
+        let [canonical_forms, classes] = count([0, 1, 0, 1, 4], 5, 1471, &orders);
+        assert_eq!(canonical_forms, classes);
     }
 }

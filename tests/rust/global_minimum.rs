@@ -1,7 +1,7 @@
 //! Hard instants, where Newton's method from the canonical start ends too high: the lowest Θ known, and the work.
 //!
 //! The lowest Θ are those of other programs (`tests/reference`): wide searches by the oracle of the Python tests, and the
-//! published hard instants. Which looks are made, and what each descent may skip, shows nowhere else.
+//! published hard instants. Which restarts are made, and what each descent may skip, shows nowhere else.
 
 use std::fs;
 use std::path::Path;
@@ -149,7 +149,7 @@ fn no_instant_ends_above_the_lowest_theta_known() {
     assert!(above.is_empty(), "{above:#?}");
 }
 
-/// Whatever look won: no gain on a player that is not seen, rows of who does not see the attacker sum to zero, and Θ is
+/// Whatever start won: no gain on a player that is not seen, rows of who does not see the attacker sum to zero, and Θ is
 /// that of its terms.
 #[test]
 fn gains_use_what_the_network_shows() {

@@ -1,0 +1,90 @@
+//! Trials side by side in blocks of eight, and what it means to move them one step.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | z | [`Blocks::z`] | row j on axis x of eight trials lies in one [`Lane`], at block · N·dim + j·dim + x |
+//! | ζ², σ² | [`Blocks::sight`], [`Blocks::capture`] | squared reaches, a lane each, or one block shared by all |
+//! | 𝒜 | [`Keys`] | bit i·N + j: player i sees player j (j = i: the attacker) |
+//! | exp(Cδ) | [`StepTable`] | by columns, so that a column times one number is a vector operation |
+//!
+//! A [`Sweep`] moves blocks; [`super::sweep`] has it compiled for the sizes that matter, [`super::anysize`] for all
+//! others.
+
+use crate::policy::step_table::StepTable;
+use crate::simd::Width;
+
+/// Trials side by side.
+pub const LANES: usize = 8;
+/// One number of each of them.
+pub type Lane = [f64; LANES];
+
+/// Sizes of a game, for code that is not compiled for them.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// N.
+    pub size: usize,
+    /// m.
+    pub rows: usize,
+    /// Axes.
+    pub dim: usize,
+    /// Words of a key.
+    pub words: usize,
+}
+
+/// The trials of a chunk, block after block.
+#[derive(Debug)]
+pub struct Blocks {
+    /// States.
+    pub z: Vec<Lane>,
+    /// Squared visibility radii, m lanes a block.
+    pub sight: Vec<Lane>,
+    /// Squared capture radii, N lanes a block: d₁…d_n, then the attacker's on the target's row.
+    pub capture: Vec<Lane>,
+    /// Lanes from one block's sight to the next: 0 where all trials share one.
+    pub sight_step: usize,
+    /// The same for the capture radii.
+    pub capture_step: usize,
+    /// Trials that still play; they fill the blocks from the front.
+    pub live: usize,
+}
+
+/// Why a sweep stopped, and at which block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// Every block has made its step.
+    End,
+    /// Some live trials of a block are over (a bit each); the block has not moved.
+    Caught(usize, u32),
+    /// Some topologies of a block are not in the table; the block has not moved.
+    Missing(usize),
+}
+
+/// The topologies of one block, a lane for each word.
+pub type Keys = Vec<[u64; LANES]>;
+
+/// Moves the blocks from one on by one step, up to the first that cannot move; its keys are left in the last argument.
+///
+/// The first table is the instant's. The second, if there is one, is the next instant's: it is fetched from memory
+/// while the blocks move.
+pub type Sweep = fn(Width, &Shape, &mut Blocks, usize, &StepTable, Option<&StepTable>, &mut Keys) -> Stop;
+
+impl Blocks {
+    /// Copies a trial from one place to another.
+    pub fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
+        let steps = [shape.size * shape.dim, self.sight_step, self.capture_step];
+        for (lanes, step) in [&mut self.z, &mut self.sight, &mut self.capture].into_iter().zip(steps) {
+            for e in 0..step {
+                lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
+            }
+        }
+    }
+}
+
+/// A bit for each place of a block in which one of `live` trials plays.
+#[inline(always)]
+pub fn playing(live: usize, block: usize) -> u32 {
+    match live - block * LANES {
+        count @ 0..LANES => (1 << count) - 1,
+        _ => u32::MAX,
+    }
+}
