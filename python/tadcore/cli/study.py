@@ -31,7 +31,7 @@ def study(
       tadcore study my-study.toml --store out --threads 4 --no-progress
       tadcore study my-study.toml --store out --table paper-i1.table
 
-    Run again, it resumes from what DIR holds. A study file looks like this:
+    Run again, it resumes from what DIR holds. A study file:
 
     \b
       scenario = "paper-i1"

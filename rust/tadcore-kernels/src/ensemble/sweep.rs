@@ -1,7 +1,7 @@
 //! One step of eight trials at a time: who is caught, who sees whom, and the product, in vector registers.
 //!
 //! Every sum runs in the order of a run that is recorded and no product is fused with a sum, so that a trial
-//! ends as it would alone, to the bit, at every [`Width`].
+//! ends bitwise as it would alone, at every [`Width`].
 //!
 //! Memory is what a step waits for, so nothing is asked for when it is needed: the blocks of a run are read before any
 //! of them moves, which puts independent work between a lookup and the product that needs it, and every run fetches a
@@ -228,7 +228,7 @@ dispatch! {
         if const { V::SIZED } {
             sweep::<V, N, M, D, Q, E>(blocks, from, table, next, keys)
         } else {
-            // Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+            // All widths agree bitwise: where loops are slow anyway, one version for all sizes will do.
             sweep_any(Width::Baseline, shape, blocks, from, table, next, keys)
         }
     }

@@ -3,7 +3,7 @@
 //! A hot loop is written once over `Simd`, the instructions of a width, and its `Number`s, which are one number or
 //! several side by side. `dispatch!` compiles it for every `Width`, and the processor decides at run time which runs.
 //! Every operation is the IEEE one on each lane and none is fused with another but by name (`Number::plus`), so every
-//! width gives the same bits.
+//! width is bitwise the same.
 //!
 //! | here | what it is |
 //! |---|---|

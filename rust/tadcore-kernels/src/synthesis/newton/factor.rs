@@ -26,7 +26,7 @@ const LIBRARY_SIZE: usize = 512;
 pub struct Backend {
     /// faer, on large matrices; its bits differ from those of the loops here.
     pub library: bool,
-    /// Registers, with the same bits.
+    /// Registers, bitwise equal.
     pub width: Width,
 }
 

@@ -1,7 +1,7 @@
 //! Runs a list of descents as wide as the processor and the list allow: one at a time, or four to sixteen side by side, in
 //! double or in single precision.
 //!
-//! Each descent gives the same bits either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
+//! Each descent is bitwise the same either way, so the choice is one of speed alone. Sizes above [`SIDE_BY_SIDE_UP_TO`]
 //! leave the first cache side by side, and go one at a time.
 
 use std::any::Any;
@@ -136,7 +136,7 @@ pub fn single(problem: &Precisions) -> bool {
     problem.single.is_some() && side_by_side(problem.double.size)
 }
 
-// Every width gives the same bits: where loops are slow anyway, one version for all sizes will do.
+// All widths agree bitwise: where loops are slow anyway, one version for all sizes will do.
 
 dispatch! {
     /// As many descents side by side as a register holds.
