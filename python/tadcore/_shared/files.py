@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import secrets
+import shutil
 import stat
+import sys
 import tempfile
+import time
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from tadcore.errors import MISSING, ScenarioError
 
 MOST = 8 << 20
 """Bytes of a text file that is read at all: what a reader makes of it takes many times as much."""
 
+PARTIAL = ".tadcore-"
+"""How the name of a file begins that is not whole yet: short, so that every legal name can be written."""
+
+_UNSUPPORTED = {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EPERM}
+_REFUSED = (
+    (stat.S_ISDIR, (errno.EISDIR, "it is a folder, and must be a file to write")),
+    (stat.S_ISSOCK, (errno.ENXIO, "it is a socket, and must be a file to write")),
+)
+_THROUGH = os.O_WRONLY | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
+_PATIENCE = 10.0  # seconds until a pipe without a reader is refused
+_LINKS = 40  # in a chain, as many as Linux follows
 _DEEPEST = 100
 _PART = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
 # A dotted key of n parts takes the parser n² of memory.
@@ -86,50 +102,173 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 
 @contextmanager
-def written(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[Path]:
-    """A file beside the destination to write to; it takes that name if the block succeeds and is removed if not.
+def written(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A file to write to, whose content the destination has if the block succeeds, and has nothing of if not.
 
-    So no reader meets half a file. Its suffix is the destination's, by which some writers choose a format. With
-    ``durable`` bytes and name are on the disk at the end, safe from a loss of power.
+    * A regular file, or a name that is free: the content is written beside it, brought to the disk and renamed, so no
+      reader meets half a file. A file that was there keeps its mode and, where the system lets it, its owner; a new one
+      has the mode that the umask gives.
+    * A symbolic link stays, and what it leads to is written.
+    * A device, a pipe, ``/dev/stdout`` or another open descriptor receives the content, and stays what it is.
+
+    The suffix is that of ``path``, by which some writers choose a format.
+
+    Raises
+    ------
+    OSError
+        It is a folder, a socket or a write-protected file, or the system refuses; the destination is named.
     """
-    destination = Path(path)
-    descriptor, name = tempfile.mkstemp(
-        prefix=f".{destination.name}.", suffix=destination.suffix.lower(), dir=destination.parent
-    )
-    os.close(descriptor)
-    partial = Path(name)
+    name = os.fspath(path)
+    with _named(name):
+        number = _descriptor(name)
+        there = destination(name)
+        if number is None and (there is None or stat.S_ISREG(there.st_mode)):
+            target = Path(os.path.realpath(name) if Path(name).is_symlink() else name)
+            with _beside(target, there, _suffix(Path(name))) as partial:
+                yield partial
+            return
+    with tempfile.TemporaryDirectory(prefix=PARTIAL) as folder:
+        partial = Path(folder) / f"content{_suffix(Path(name))}"
+        partial.touch()
+        yield partial
+        with _named(name), partial.open("rb") as content:
+            _pour(content, _opened(name) if number is None else os.dup(number))
+
+
+def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a file that appears whole or not at all; see `written`."""
+    with written(path) as partial:
+        partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+def destination(path: str | os.PathLike[str]) -> os.stat_result | None:
+    """What is at a place to be written, links followed; None where the name is free.
+
+    Tells before long work what `written` would refuse: raises OSError for a folder, a socket, a write-protected file.
+    """
+    number = _descriptor(os.fspath(path))
+    if number is not None:
+        return os.fstat(number)
+    try:
+        there = Path(path).stat()
+    except FileNotFoundError:
+        return None
+    refused = next((words for holds, words in _REFUSED if holds(there.st_mode)), None)
+    if refused is None and not os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
+        refused = (errno.EACCES, "it is write-protected")
+    if refused is not None:
+        raise OSError(*refused, os.fspath(path))
+    return there
+
+
+@contextmanager
+def _beside(target: Path, there: os.stat_result | None, suffix: str) -> Iterator[Path]:
+    """The destination's content under a short name in its folder, until it is whole."""
+    mode = 0o666 if there is None else stat.S_IMODE(there.st_mode) & 0o777
+    partial = target.with_name(f"{PARTIAL}{secrets.token_hex(8)}{suffix}")
+    # Made with the mode, less the umask: never more open than the destination, and none to be set where it is new.
+    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode | 0o600))
     try:
         yield partial
-        if durable:
-            with partial.open("rb+") as stream:
-                os.fsync(stream.fileno())
-        partial.chmod(0o666 & ~_umask())
-        partial.replace(destination)
+        with partial.open("rb+") as stream, _if_supported():
+            os.fsync(stream.fileno())
+        if there is not None:
+            _dress(partial, there, mode)
+        partial.replace(target)
     except BaseException:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink()
         raise
-    if durable:
-        _sync_folder(destination.parent)
+    _sync_folder(target.parent)
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes, *, durable: bool = False) -> None:
-    """Write a file that appears whole or not at all; see `written`."""
-    with written(path, durable=durable) as partial:
-        partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+def _dress(partial: Path, there: os.stat_result, mode: int) -> None:
+    """Owner and mode of the file that is replaced, as far as the file system knows of them."""
+    ours = partial.stat()
+    if (ours.st_uid, ours.st_gid) != (there.st_uid, there.st_gid):
+        with _if_supported():
+            os.chown(partial, there.st_uid, there.st_gid)
+    if stat.S_IMODE(partial.stat().st_mode) != mode:
+        with _if_supported():
+            partial.chmod(mode)
 
 
 def _sync_folder(folder: Path) -> None:
     """Bring a new name to the disk, where the system can open folders at all."""
     if not hasattr(os, "O_DIRECTORY"):
         return
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    with _if_supported(errno.EBADF, errno.EACCES):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+@contextmanager
+def _if_supported(*more: int) -> Iterator[None]:
+    """Go on where a file system has no such operation (network, FUSE and object-store mounts); nothing else passes."""
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        yield
+    except OSError as error:
+        if error.errno not in _UNSUPPORTED and error.errno not in more:
+            raise
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    """Name the destination in errors that name the partial file or nothing."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None or not (error.filename is None or PARTIAL in str(error.filename)):
+            raise
+        raise OSError(error.errno, error.strerror, name) from error
+
+
+def _descriptor(name: str) -> int | None:
+    """The open descriptor that a path leads to, such as /dev/stdout, which must not be opened a second time.
+
+    Where the shell sent it to a file, a second descriptor would begin at the file's start, over what is there.
+    """
+    folders = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd", "/proc/thread-self/fd")}
+    path = Path(name)
+    for _ in range(_LINKS):
+        if path.name.isascii() and path.name.isdigit() and os.path.realpath(path.parent) in folders:
+            return int(path.name)
+        try:
+            path = path.parent / path.readlink()
+        except OSError:
+            return None
+    return None
+
+
+def _opened(name: str) -> int:
+    """A device or a pipe, open to be written; a pipe that nobody reads is refused after a while, not waited for."""
+    until = time.monotonic() + _PATIENCE
+    while True:
+        try:
+            descriptor = os.open(name, _THROUGH)
+        except OSError as error:
+            if error.errno != errno.ENXIO:
+                raise
+            if time.monotonic() > until:
+                raise OSError(errno.ENXIO, "nobody reads this pipe") from None
+            time.sleep(0.01)
+        else:
+            os.set_blocking(descriptor, True)
+            return descriptor
+
+
+def _pour(content: BinaryIO, descriptor: int) -> None:
+    """Write all of a file to an open descriptor, behind what this process has printed."""
+    with os.fdopen(descriptor, "wb") as stream:
+        for printed in (sys.stdout, sys.stderr):
+            if printed is not None and not printed.closed:
+                printed.flush()
+        shutil.copyfileobj(content, stream)
+
+
+def _suffix(path: Path) -> str:
+    """The suffix, by which some writers choose a format; none where it is too long to be one."""
+    return path.suffix.lower() if len(os.fsencode(path.suffix)) <= 16 else ""

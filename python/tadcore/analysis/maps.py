@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.files import destination, write_whole
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
@@ -78,8 +79,6 @@ class OutcomeMap:
         check_destination("path", target)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.suffix == ".nc":
-            from tadcore._shared.files import write_whole
-
             write_whole(target, bytes(self.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
             return target
         import matplotlib.pyplot as plt
@@ -197,10 +196,11 @@ def outcome_map(
 
 
 def check_destination(field: str, path: Path) -> None:
-    """Refuse a file name that tells nothing of what to write."""
+    """Refuse a file name that tells nothing of what to write, and a place that cannot be written."""
     if path.suffix not in _FIGURES | {".nc"}:
         kinds = ", ".join(sorted(_FIGURES))
         raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
+    destination(path)
 
 
 def _axis(field: str, given: Sequence[Any]) -> Floats:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from tadcore._shared.files import write_whole
+from tadcore._shared.files import destination, write_whole
 
 from .options import FAILED, Changes, Source, read
 from .terminal import complain, say
@@ -35,6 +35,8 @@ def verify(
     """
     from tadcore.verification import verify as check
 
+    if out is not None:
+        destination(out)
     report = check(read(scenario, changes), deviations=deviations, starts=starts, seed=seed, bound=bound)
     if out is not None:
         write_whole(out, json.dumps(report.to_dict(), indent=2) + "\n")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from itertools import zip_longest
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore import _core, scenarios
+from tadcore._shared.files import write_whole
 from tadcore._shared.progress import bar
 from tadcore.simulation.run import Run, simulate
 
@@ -41,7 +41,7 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
     ----------
     out : path
         The folder to write into; made if it is missing, other files in it are left alone. Everything is prepared
-        beside it first and moved there at the end, so an interrupted call leaves ``out`` as it was.
+        elsewhere first and copied there at the end, each file whole, so an interrupted call leaves ``out`` as it was.
     figures : bool
         Whether to draw the figures, each as PNG and PDF.
     console : rich.console.Console, optional
@@ -63,17 +63,13 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
     watched = console.is_terminal
     runs = {case.scenario: simulate(scenarios.load(case.scenario)) for case in bar(PUBLISHED, "runs", show=watched)}
     report = Report(rows=compare(runs), version=_core.__version__)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        (draft / "report.md").write_text(report.to_markdown(), encoding="utf-8")
-        text = json.dumps(report.to_dict(), indent=2, ensure_ascii=False)
-        (draft / "report.json").write_text(text + "\n", encoding="utf-8")
+    with tempfile.TemporaryDirectory(prefix="tadcore-") as folder:
+        draft = Path(folder)
+        write_whole(draft / "report.md", report.to_markdown())
+        write_whole(draft / "report.json", json.dumps(report.to_dict(), indent=2, ensure_ascii=False) + "\n")
         if figures:
             _draw(runs, draft, show=watched)
-        files = _move(draft, target)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        files = _copied(draft, target)
     report = Report(rows=report.rows, version=report.version, files=tuple(files))
     report.print(console)
     pictures = sum(file.suffix == ".png" for file in files)
@@ -172,10 +168,10 @@ def _draw(runs: Mapping[str, Run], folder: Path, *, show: bool) -> None:
             save(FIGURES[name](runs), folder / name)
 
 
-def _move(draft: Path, target: Path) -> list[Path]:
-    target.mkdir(exist_ok=True)
+def _copied(draft: Path, target: Path) -> list[Path]:
+    target.mkdir(parents=True, exist_ok=True)
     files = []
     for file in sorted(draft.iterdir()):
-        file.replace(target / file.name)
+        write_whole(target / file.name, file.read_bytes())
         files.append(target / file.name)
     return files

@@ -22,7 +22,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
-from tadcore._shared.files import strange, write_whole
+from tadcore._shared.files import PARTIAL, strange, write_whole
 from tadcore.errors import StoreError
 
 from .manifest import Manifest, environment, reason
@@ -61,7 +61,7 @@ class Store:
             raise StoreError(str(place), "another run is writing to it", "wait for its end, or stop it") from None
         try:
             manifest = _agreed(place, wanted)
-            for partial in [*place.glob(".part-*.parquet.*"), *place.glob(".manifest.json.*")]:
+            for partial in [*place.glob(f"{PARTIAL}*.parquet"), *place.glob(f"{PARTIAL}*.json")]:
                 with _faults(partial):
                     partial.unlink()  # left by a run that was killed
             if manifest.trials != wanted.trials or not (place / "manifest.json").exists():
@@ -156,8 +156,10 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
 
 
 def _write(path: Path, content: str | bytes) -> None:
+    if path.is_symlink():  # a store that came from elsewhere must not decide what else is written
+        raise StoreError(str(path), "it is a link, and a store writes nothing outside its folder", "remove the link")
     with _faults(path):
-        write_whole(path, content, durable=True)
+        write_whole(path, content)
 
 
 @contextlib.contextmanager

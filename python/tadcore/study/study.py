@@ -211,7 +211,7 @@ class Study:
         table : path, optional
             A file that keeps the game's table of transitions from study to study: read before, written after. With it
             a study of the same game reuses the saved gain table; the outcomes are the same. Not used by the workers
-            of an executor.
+            of an executor. A file that is no such table is refused.
 
         Returns
         -------
@@ -247,7 +247,7 @@ class Study:
         game_of(self.scenario).equilibrium()
         schema = schema_of(self.columns)
         opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), schema)
-        with opened as kept, warm(self.scenario, kept_table), Progress(self.trials, wanted=progress) as bar:
+        with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:
             chunks = Collection(self._plan, self.trials, schema, kept, bar, until)
             return StudyResult(self, chunks.gather(executor, workers))
 

@@ -8,36 +8,53 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from tadcore._shared.files import strange, write_whole
+from tadcore._shared.files import destination, strange, write_whole
+from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
 from tadcore.scenario.model import Scenario
 
-NAME = "transitions.bin"
-"""The file beside a store's parts."""
+_MAGIC = b"tadtable"  # how every saved table begins, whatever its format; a test compares it with the core's
 
 
 @contextlib.contextmanager
-def warm(sc: Scenario, path: str | os.PathLike[str] | None) -> Iterator[None]:
+def warm(sc: Scenario, path: Path | None) -> Iterator[None]:
     """Read the table before, and write it after if it has grown; outcomes are the same with it and without.
 
-    A file of another game or version, or a damaged one, costs time and nothing else: it is replaced, with a warning.
+    A table of another game or version, or a damaged one, costs time and nothing else: it is replaced, with a warning.
+    What is no table, a scenario or a part given by mistake, is not touched: raises `ScenarioError`.
     """
     if path is None:
         yield
         return
-    game, place = game_of(sc), Path(path)
+    game = game_of(sc)
     held = 0
-    if place.exists():
+    if _is_table(path):
         try:
-            found = strange(place)
-            if found is not None:
-                raise ValueError(f"it is {found}, not a file")
-            held = game.load_table(place.read_bytes())
+            held = game.load_table(path.read_bytes())
         except (ValueError, OSError) as error:
-            warnings.warn(f"{place}: {error}; the study starts with an empty table", RuntimeWarning, stacklevel=4)
+            warnings.warn(f"{path}: {error}; the study starts with an empty table", RuntimeWarning, stacklevel=4)
     yield
     if game.table()["entries"] > held:
         try:
-            write_whole(place, game.save_table())
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, game.save_table())
         except OSError as error:
-            warnings.warn(f"{place}: the table was not saved ({error.strerror})", RuntimeWarning, stacklevel=4)
+            warnings.warn(f"{path}: the table was not saved ({error.strerror})", RuntimeWarning, stacklevel=4)
+
+
+def _is_table(path: Path) -> bool:
+    """Whether there is a table to read, whole or not; raises `ScenarioError` for what must not be replaced by one."""
+    rule = "a table that a study has saved, or a new name"
+    try:
+        if destination(path) is None:
+            return False
+        found = strange(path)
+        if found is not None:
+            raise ScenarioError("table", os.fspath(path), f"{rule}: this is {found}")
+        with path.open("rb") as stream:
+            begins = stream.read(len(_MAGIC))
+    except OSError as error:
+        raise ScenarioError("table", os.fspath(path), f"{rule}: {error.strerror or error}") from None
+    if begins not in (_MAGIC, b""):
+        raise ScenarioError("table", os.fspath(path), f"{rule}: this is another file, which would be lost")
+    return True

@@ -58,11 +58,11 @@ def test_what_is_no_file_is_refused_in_a_store(tmp_path, kind, name):
         assert caught.value.path == str(folder / name)
 
 
-def test_a_pipe_for_a_table_of_gains_is_replaced_with_a_warning(tmp_path):
+def test_a_pipe_for_a_table_of_gains_is_refused(tmp_path):
     put(tmp_path / "table", "a pipe")
-    with pytest.warns(RuntimeWarning, match="it is a pipe, not a file; the study starts with an empty table"):
+    with pytest.raises(ScenarioError, match="must be a table that a study has saved, or a new name: this is a pipe"):
         study(50).run(table=tmp_path / "table")
-    assert (tmp_path / "table").is_file()
+    assert (tmp_path / "table").is_fifo()
 
 
 def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path, capsys):

@@ -106,7 +106,7 @@ def test_kill_9_loses_only_what_was_in_flight(tmp_path):
     cut = tadcore.load_study(folder)
     assert cut.trials == len(survived[1]) * CHUNK
     assert "163,840 trials" in repr(cut)
-    (folder / ".part-000099.parquet.abc").write_bytes(b"half a part")
+    (folder / ".tadcore-abc.parquet").write_bytes(b"half a part")
     result = study(20 * CHUNK).run(store=folder)
     whole = study(20 * CHUNK).run(store=tmp_path / "whole")
     assert result.table.equals(whole.table)

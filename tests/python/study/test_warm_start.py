@@ -1,5 +1,6 @@
 """A table kept from study to study: the same outcomes, nothing solved twice, and bad files that cost only time."""
 
+import os
 import subprocess
 import sys
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 import tadcore
+from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
 from tadcore.sampling import Box
 
@@ -39,12 +41,50 @@ def test_a_second_study_starts_warm_and_ends_alike(tmp_path):
     assert np.array_equal(second["time"], first.time)
 
 
-@pytest.mark.parametrize("content", [b"", b"not a table at all, but long enough to have a header and a checksum in it"])
-def test_a_file_that_is_no_table_is_named_and_replaced(tmp_path, content):
+def short(step=0.02):
+    sc = tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": step})
+    return tadcore.Study(sc, vary=PLACES, trials=50, seed=4)
+
+
+@pytest.mark.parametrize("change", [lambda table: b"", lambda table: table[:-1], lambda table: table[:8]])
+def test_a_damaged_table_is_named_and_replaced(tmp_path, change):
     kept = tmp_path / "table.bin"
-    kept.write_bytes(content)
-    sc = tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": 0.02})
-    study = tadcore.Study(sc, vary=PLACES, trials=50, seed=4)
-    with pytest.warns(RuntimeWarning, match="table.bin: the bytes are not a saved table"):
-        study.run(table=kept)
-    assert kept.read_bytes().startswith(b"tadtable")
+    short().run(table=kept)
+    whole = kept.read_bytes()
+    kept.write_bytes(change(whole))
+    with pytest.warns(RuntimeWarning, match="table.bin: the "):
+        short().run(table=kept)
+    assert kept.read_bytes() == whole
+
+
+def test_the_table_of_another_game_is_named_and_replaced(tmp_path):
+    kept = tmp_path / "table.bin"
+    short().run(table=kept)
+    with pytest.warns(RuntimeWarning, match="table.bin: "):
+        short(0.04).run(table=kept)
+    assert kept.read_bytes() == game_of(short(0.04).scenario).save_table()
+
+
+def test_what_is_no_table_is_refused_before_anything_is_made(tmp_path):
+    short().run(store=tmp_path / "other")
+    precious = [tmp_path / "scenario.toml", next((tmp_path / "other").glob("part-*.parquet")), tmp_path / "zeros"]
+    short().scenario.to_toml(precious[0])
+    with precious[2].open("wb") as stream:
+        stream.truncate(3 << 30)  # a hole, which takes no room and would take memory
+    (tmp_path / "link").symlink_to(precious[0])
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    before = [path.stat() for path in precious]
+    others = [tmp_path / name for name in ("link", "folder", "pipe", "x" * 300)]
+    for path in [*precious, *others]:
+        with pytest.raises(
+            ScenarioError, match=r"^table: got .* must be a table that a study has saved, or a new name"
+        ):
+            short().run(table=path, store=tmp_path / "store")
+    assert [path.stat() for path in precious] == before
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_table_is_saved_into_a_folder_that_is_made(tmp_path):
+    short().run(table=tmp_path / "new" / "folder" / "table.bin")
+    assert (tmp_path / "new" / "folder" / "table.bin").read_bytes().startswith(b"tadtable")
