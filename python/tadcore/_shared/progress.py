@@ -10,7 +10,9 @@ Item = TypeVar("Item")
 
 def bar(items: Sequence[Item], what: str, *, show: bool) -> Iterable[Item]:
     """The items one by one, with a progress bar where one is wanted and standard error is a terminal."""
+    if not show:
+        return items
     from tqdm.auto import tqdm
 
-    progress: Iterable[Item] = tqdm(items, desc=what, disable=None if show else True)  # None: quiet in a pipe
+    progress: Iterable[Item] = tqdm(items, desc=what, disable=None)  # None: quiet in a pipe
     return progress

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
+from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
@@ -20,8 +21,6 @@ from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
 
 from .vary import quantities
-
-_CHECKED_AHEAD = 128  # chunks, about a million trials: their draws cost little beside their games
 
 
 class Outcomes(NamedTuple):
@@ -84,32 +83,27 @@ class Plan:
             words = f"larger than the defender's capture radius, {float(reach[int(bad.argmax())])!r}"
             self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, words)
 
-    def check_ahead(self, trials: int) -> None:
-        """Check what can be checked before anything runs.
+    def check_ahead(self, trials: int, *, progress: bool = False) -> None:
+        """Check before anything runs that every trial is a game: a millisecond a chunk, one chunk in memory at a time.
 
-        The first chunk always; all of the first million trials where the supports of the samplers do not prove that
-        every draw is a game. Later chunks are checked as they come.
+        Where the supports of the samplers prove it, the first chunk is enough.
         """
-        whole = math.ceil(trials / CHUNK)
-        for chunk in range(1 if self._proven() else min(whole, _CHECKED_AHEAD)):
+        chunks = range(1 if self._proven() else math.ceil(trials / CHUNK))
+        for chunk in bar(chunks, "checking draws", show=progress):
             self.check(chunk, self.draw(chunk, min(CHUNK, trials - chunk * CHUNK)))
 
     def _proven(self) -> bool:
-        """Whether the supports of the samplers alone leave no bad draw possible, up to the finiteness of positions."""
+        """Whether the supports of the samplers alone leave no bad draw possible."""
         sc = self.scenario
         reach = {("visibility_radius", i): (float(r), float(r)) for i, r in enumerate(sc.visibility_radii)}
         reach |= {("capture_radius", i): (float(r), float(r)) for i, r in enumerate(sc.capture_radii)}
         for quantity, sampler in self.varied:
-            low, high = sampler.bounds()
-            if quantity.field == "position":
-                if math.isnan(low):
-                    return False
-                continue
-            if not low > 0.0:
+            ends = sampler.bounds()
+            if not all(rule.holds(end) for rule in OF_FIELD[quantity.field] for end in ends):
                 return False
-            reach[quantity.field, quantity.row] = low, high
+            reach[quantity.field, quantity.row] = ends
         pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
-        return all(capture[1] < sight[0] for capture, sight in pairs)
+        return all(sees_whom_it_intercepts(capture[1], sight[0]) for capture, sight in pairs)
 
     def _refuse(self, chunk: int, path: str, values: Floats, bad: NDArray[np.bool_], rule: str) -> None:
         if bad.any():

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 import types
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 import tadcore
-from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, parts, ring, study
+from study_cases import CHUNK, ESCAPE, calm, calm_team, escaping, ring, study
 from tadcore import ScenarioError, Study
 from tadcore.sampling import Box, Cycle, Disk, Gaussian
 
@@ -286,12 +287,69 @@ def test_a_bad_draw_is_refused_before_anything_runs(vary, words, monkeypatch, tm
     assert not (tmp_path / "store").exists()
 
 
-def test_a_bad_draw_beyond_the_first_million_ends_the_study_and_keeps_what_came_before(monkeypatch, tmp_path):
-    monkeypatch.setattr("tadcore.study.plan._CHECKED_AHEAD", 1)
-    with pytest.raises(ScenarioError, match=r"attacker\.position\.y, trial 9,000: got nan"):
-        study(2 * CHUNK, vary={"attacker.position": nan_at_9000}).run(store=tmp_path)
-    assert list(parts(tmp_path)) == ["part-000000.parquet"]
-    assert tadcore.load_study(tmp_path).trials == CHUNK
+def first_at_most(seed, trials, mean, spread, bound):
+    """The first trial of N(mean, spread²) at most ``bound``, from the documented stream and SciPy's quantiles."""
+    for chunk in range(math.ceil(trials / CHUNK)):
+        low = stats.norm(mean, spread).ppf(philox(seed, chunk, PURPOSE_OF_D1_SIGHT, 1)[:, 0]) <= bound
+        if low.any():
+            trial = chunk * CHUNK + int(low.argmax())
+            return trial if trial < trials else None
+    return None
+
+
+PURPOSE_OF_D1_SIGHT = 8 * 2 + 1
+
+
+@pytest.mark.parametrize(
+    ("spread", "seed", "trials"),
+    [(0.19, 11, 1_600_000), (0.185, 12, 3_000_000), (0.18, 5, 6_000_000), (0.19, 11, 1_408_743)],
+)
+def test_every_trial_of_a_long_study_is_checked_before_anything_runs(monkeypatch, tmp_path, spread, seed, trials):
+    class PlayedError(Exception):
+        pass
+
+    def played(*given, **named):
+        raise PlayedError
+
+    monkeypatch.setattr("tadcore.study.plan.simulate_batch", played)
+    wanted = study(trials, seed, vary={"d1.visibility_radius": stats.norm(1.0, spread)})
+    bad = first_at_most(seed, trials, 1.0, spread, 0.1)
+    if bad is None:
+        with pytest.raises(PlayedError):
+            wanted.run()
+        return
+    assert bad > 2**20
+    with pytest.raises(
+        ScenarioError, match=rf"^defenders\.0\.visibility_radius, trial {bad:,}: got .*, must be larger"
+    ):
+        wanted.run(store=tmp_path / "store")
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_normal_position_is_checked_to_the_last_trial():
+    seed, trials, bound = 3, 2_000_000, 1e100 / stats.norm.isf(3e-7)
+    values = np.abs(study(trials, seed, vary={"target.position.x": Gaussian(0.0, bound)}).inputs()["target.position.x"])
+    bad = int((values > 1e100).argmax())
+    assert bad > CHUNK
+    with pytest.raises(ScenarioError, match=rf"^target\.position\.x, trial {bad:,}: got .* between -1e100 and 1e100"):
+        study(trials, seed, vary={"target.position.x": Gaussian(0.0, bound)}).run()
+
+
+def test_the_check_of_a_very_long_study_stops_on_ctrl_c_and_needs_no_memory(tmp_path):
+    signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    began = time.monotonic()
+    tracemalloc.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            study(2**32, vary={"d1.visibility_radius": stats.norm(5.0, 0.1)}).run(store=tmp_path / "store")
+        assert tracemalloc.get_traced_memory()[1] < 20e6
+    finally:
+        tracemalloc.stop()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    assert time.monotonic() - began < 2.0
+    assert not (tmp_path / "store").exists()
 
 
 def test_radii_without_limit_and_distributions_that_reach_below_are_taken_as_drawn():
