@@ -1,19 +1,24 @@
-"""Questions over many games: outcome maps, the value of a radius, sensitivity, sweeps over weights."""
+"""Questions over many games: outcome maps, where to place a player, radii, sensitivity, sweeps over weights."""
 
 from tadcore.statistics.radius import RadiusCurve
 from tadcore.statistics.sobol import Sensitivity, sobol
 
 from .maps import OutcomeMap, outcome_map
+from .placement import BestStart, ProbabilityMap, best_start, probability_map
 from .radius import radius_curve
 from .sensitivities import sensitivity
 from .sweeps import SweepResult, sweep
 
 __all__ = [
+    "BestStart",
     "OutcomeMap",
+    "ProbabilityMap",
     "RadiusCurve",
     "Sensitivity",
     "SweepResult",
+    "best_start",
     "outcome_map",
+    "probability_map",
     "radius_curve",
     "sensitivity",
     "sobol",

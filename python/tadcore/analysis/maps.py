@@ -151,9 +151,7 @@ def outcome_map(
     player = label(player)
     if player not in sc.players:
         raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")
-    if z is not None and (sc.dim == 2 or not math.isfinite(z)):
-        raise ScenarioError("z", z, "a finite height" if sc.dim == 3 else "left out: this game is in the plane")
-    columns, rows = _axis("x", x), _axis("y", y)
+    columns, rows, up = axis_of_grid("x", x), axis_of_grid("y", y), height(sc, player, z)
     who = sc.players.index(player)
     shape = (len(rows), len(columns))
     kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
@@ -166,8 +164,8 @@ def outcome_map(
         positions = np.repeat(sc.positions[np.newaxis], len(places), axis=0)
         positions[:, who, 0] = columns[places % len(columns)]
         positions[:, who, 1] = rows[places // len(columns)]
-        if z is not None:
-            positions[:, who, 2] = z
+        if up is not None:
+            positions[:, who, 2] = up
         batch = simulate_batch(sc, positions, threads=threads)
         for whole, part in zip(flat, (batch.kind, batch.defender, batch.time), strict=True):
             whole[block] = part
@@ -188,7 +186,7 @@ def outcome_map(
             attrs={
                 "title": f"Outcome by the start of {player}",
                 "player": player,
-                **({} if sc.dim == 2 else {"z": float(sc.positions[who, 2] if z is None else z)}),
+                **({} if up is None else {"z": up}),
                 **provenance(sc),
             },
         ),
@@ -203,7 +201,17 @@ def check_destination(field: str, path: Path) -> None:
     destination(path)
 
 
-def _axis(field: str, given: Sequence[Any]) -> Floats:
+def height(sc: Scenario, player: str, z: float | None) -> float | None:
+    """In space, the height of the plane of a grid: the one given, or the player's own; None in the plane."""
+    if z is not None and (sc.dim == 2 or not math.isfinite(z)):
+        raise ScenarioError("z", z, "a finite height" if sc.dim == 3 else "left out: this game is in the plane")
+    if sc.dim == 2:
+        return None
+    return float(sc.positions[sc.players.index(player), 2] if z is None else z)
+
+
+def axis_of_grid(field: str, given: Sequence[Any]) -> Floats:
+    """The places of one axis of a grid, from (low, high, count)."""
     try:
         low, high, count = given
         ends = float(low), float(high)

@@ -1,4 +1,4 @@
-"""The same starts, played at any radius of one player."""
+"""The same trials, played at any radius or from any start of one player."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.starts import Rows, rows_of
 from tadcore.statistics import TrialOutcomes
+from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusKind
+from tadcore.study.study import Study
 
 
-def starts_of(source: Scenario | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
-    """The game and the starts to play: those given, or those of a study."""
+def starts_of(source: Scenario | Study | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
+    """The game and the starts to play: those given, or those of a study, played or not."""
     if not isinstance(source, Scenario):
         if positions is not None:
             raise ScenarioError("positions", "an array", "left out: a study brings its own starts")
-        return source.scenario, rows_of(source.scenario, source.inputs, source.trials)
+        inputs = source.inputs() if isinstance(source, Study) else source.inputs
+        return source.scenario, rows_of(source.scenario, inputs, source.trials)
     if positions is None:
         raise ScenarioError("positions", MISSING, "the starts to play, of shape (M, n + 2, dim)")
     starts = as_positions(positions, (source.n + 2, source.dim), rows=True)
@@ -74,3 +77,32 @@ class Replays:
         if self.kind == "visibility":
             return simulate_batch(self.sc, positions, varied, capture, threads=self.threads)
         return simulate_batch(self.sc, positions, visibility, varied, threads=self.threads)
+
+
+class Placed:
+    """The trials of a study, played from any start of one player."""
+
+    def __init__(self, source: Study | TrialOutcomes, player: str, threads: int | None) -> None:
+        self.sc, self.rows = starts_of(source, None)
+        self.player, self.threads = label(player), threads
+        if self.player not in self.sc.players:
+            raise ScenarioError("player", player, f"one of {', '.join(self.sc.players)}")
+        self.row = self.sc.players.index(self.player)
+        self.own = self.sc.positions[self.row]
+
+    @property
+    def trials(self) -> int:
+        """M."""
+        return len(self.rows)
+
+    def events(self, places: Floats) -> NDArray[np.bool_]:
+        """Which trials ended in each outcome from each place (L, dim): shape (3 + n, L, M)."""
+        positions = np.tile(self.rows.positions, (len(places), 1, 1))
+        positions[:, self.row] = np.repeat(places, self.trials, axis=0)
+        sight, capture = (
+            radii if radii.ndim == 1 else np.tile(radii, (len(places), 1))
+            for radii in (self.rows.visibility_radii, self.rows.capture_radii)
+        )
+        batch = simulate_batch(self.sc, positions, sight, capture, threads=self.threads)
+        events = indicators(batch.kind, batch.defender, self.sc.n)
+        return events.reshape(len(events), len(places), self.trials)

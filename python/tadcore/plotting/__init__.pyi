@@ -14,6 +14,7 @@ from .study.charts import (
     sensitivity as sensitivity,
 )
 from .study.maps import outcome_map as outcome_map
+from .study.probability import probability_map as probability_map
 from .study.shares import outcomes_by_input as outcomes_by_input, outcomes_by_inputs as outcomes_by_inputs
 from .tools.labels import Labels as Labels
 from .tools.save import save as save

@@ -23,8 +23,8 @@ _HATCHED = 240  # grid points along an axis from which hatches are cut; finer on
 _KINDS = ("timeout", "captured")
 
 
-class GridOutcomes(Protocol):
-    """The outcomes over a grid of one player's start; `tadcore.OutcomeMap` has them."""
+class OverStarts(Protocol):
+    """Something over a grid of one player's start: `tadcore.OutcomeMap`, `tadcore.analysis.ProbabilityMap`."""
 
     @property
     def scenario(self) -> Scenario:
@@ -36,11 +36,11 @@ class GridOutcomes(Protocol):
 
     @property
     def dataset(self) -> xarray.Dataset:
-        """``kind``, ``defender`` and ``time`` over (y, x)."""
+        """``kind``, ``defender`` and ``time`` over (y, x), or ``estimate`` and its intervals over (outcome, y, x)."""
 
 
 def outcome_map(
-    found: GridOutcomes, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
+    found: OverStarts, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
 ) -> Axes:
     """Draw how, or when, the game ends by the start of one player.
 
@@ -75,7 +75,7 @@ def outcome_map(
     if quantity not in ("outcome", "time"):
         raise ValueError(f"no quantity {quantity!r}; one of outcome, time")
     x, y = (np.asarray(found.dataset[axis].values, dtype=float) for axis in "xy")
-    left, right, bottom, top = extent = (*_edges(x, y), *_edges(y, x))
+    left, right, bottom, top = extent = (*edges(x, y), *edges(y, x))
     ratio = (top - bottom) / (right - left)
     width = PAGE if ratio < 1.0 / 3.0 else COLUMN
     beside = 0.6 if quantity == "time" and legend else 0.0  # inches that the colour bar takes
@@ -89,21 +89,21 @@ def outcome_map(
         if legend:
             bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
             bar.figure.colorbar(image, cax=bar, label="termination time")
-    _players(ax, found, extent, radii=radii, dark=quantity == "time")
+    draw_players(ax, found, extent, radii=radii, dark=quantity == "time")
     who = symbol(found.player)
     ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
     ax.set_aspect("equal")
     return ax
 
 
-def _edges(points: Floats, others: Floats) -> tuple[float, float]:
+def edges(points: Floats, others: Floats) -> tuple[float, float]:
     """Where the first and the last cell of an axis end; a single place is as wide as the other axis's cells."""
     spread = points if len(points) > 1 else others
     half = float(spread[1] - spread[0]) / 2.0 if len(spread) > 1 else 0.5
     return float(points[0]) - half, float(points[-1]) + half
 
 
-def _areas(ax: Axes, found: GridOutcomes, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
+def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
     """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
     code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
@@ -127,7 +127,8 @@ def _areas(ax: Axes, found: GridOutcomes, x: Floats, y: Floats, extent: tuple[fl
     return [names[i] for i in there]
 
 
-def _players(ax: Axes, found: GridOutcomes, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
+def draw_players(ax: Axes, found: OverStarts, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
+    """The players where they start, with their radii; a hollow marker for the one whose start varies."""
     sc, left, right, bottom, top = found.scenario, *extent
     labels = Labels(ax)
     sight = dict(zip(sc.constrained, sc.visibility_radii, strict=True))
