@@ -13,6 +13,7 @@ from .study.charts import (
     radius_curve as radius_curve,
     sensitivity as sensitivity,
 )
+from .study.joint import outcomes_over as outcomes_over
 from .study.maps import outcome_map as outcome_map
 from .study.probability import probability_map as probability_map
 from .study.shares import outcomes_by_input as outcomes_by_input, outcomes_by_inputs as outcomes_by_inputs

@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tadcore import plotting, statistics
 from tadcore._shared.arrays import Floats
+from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
 from tadcore.statistics.outcomes import indicators
 
@@ -18,6 +20,7 @@ from .parts import Code, Picture, Reported, Row, Section, Table
 
 _DPI = 220
 _EXAMPLES = 5
+_LEAST_IN_A_PLANE = 200  # trials; fewer would fill too few cells
 _MOST_INPUTS = 12  # panels of shares by input; the table of inputs lists all of them
 
 
@@ -96,6 +99,7 @@ def inputs(result: Reported) -> Section:
         more = f" (the first {len(shown)} of {len(result.inputs)})" if len(shown) < len(result.inputs) else ""
         caption = f"Shares of the outcomes where each input is in one of ten equally filled ranges{more}."
         figures.append(_picture(caption, lambda r: plotting.outcomes_by_inputs(r, varying), result, wide=True))
+        figures += _planes(result, varying)
     return Section(
         "Inputs",
         tables=[
@@ -104,6 +108,19 @@ def inputs(result: Reported) -> Section:
         ],
         figures=figures,
     )
+
+
+def _planes(result: Reported, varying: list[str]) -> list[Picture]:
+    """The share of interceptions over the plane of every start that varies."""
+    figures = []
+    for x in varying:
+        y = f"{x[:-1]}y"
+        if x.endswith(".position.x") and y in varying and result.trials >= _LEAST_IN_A_PLANE:
+            caption = (
+                f"Share of interceptions by {short(x.removesuffix('.x'))}; cells of fewer than five trials are empty."
+            )
+            figures.append(_picture(caption, partial(plotting.outcomes_over, x=x, y=y), result))
+    return figures
 
 
 def _row(name: str, cells: list[str]) -> Row:

@@ -293,3 +293,42 @@ def test_panels_share_one_legend(result):
     assert [ax.axison for ax in four.flat] == [True, True, True, False]
     with pytest.raises(ValueError, match="need as many axes"):
         plotting.outcomes_by_inputs(result, names, Figure().subplots(1, 2))
+
+
+def test_shares_over_two_inputs_are_counts_of_cells(sc):
+    result = Result(sc, 400)
+    ax = plotting.outcomes_over(result, "attacker.position.x", "target.position.y", outcome="captured", cells=4)
+    mesh = ax.collections[0]
+    shown = np.ma.filled(mesh.get_array(), np.nan)
+    x, y = result.inputs["attacker.position.x"], result.inputs["target.position.y"]
+    edges = [np.linspace(values.min(), values.max(), 5) for values in (x, y)]
+    filled = 0
+    for row in range(4):
+        for column in range(4):
+            right = x <= edges[0][column + 1] if column == 3 else x < edges[0][column + 1]
+            under = y <= edges[1][row + 1] if row == 3 else y < edges[1][row + 1]
+            inside = (x >= edges[0][column]) & right & (y >= edges[1][row]) & under
+            assert inside.sum() >= 5
+            assert shown[row, column] == pytest.approx(np.mean(result.kind[inside] == 1))
+            filled += inside.sum()
+    assert filled == 400
+
+
+def test_cells_of_few_trials_stay_empty(result):
+    ax = plotting.outcomes_over(result, "attacker.position.x", "target.position.y", cells=12, least=3)
+    shown = np.ma.filled(ax.collections[0].get_array(), np.nan)
+    assert np.isnan(shown).any()
+    assert np.isfinite(shown).any()
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "outcome", "said"),
+    [
+        ("attacker.position.z", "target.position.y", "captured", "no input"),
+        ("attacker.position.x", "defenders.0.capture_radius", "captured", "no two finite values"),
+        ("attacker.position.x", "target.position.y", "d7", "no outcome"),
+    ],
+)
+def test_shares_over_what_is_not_there_are_refused(result, x, y, outcome, said):
+    with pytest.raises(ValueError, match=said):
+        plotting.outcomes_over(result, x, y, outcome=outcome)

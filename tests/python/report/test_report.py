@@ -103,7 +103,7 @@ def test_the_page_holds_the_numbers_and_needs_nothing_else(result, tmp_path):
     assert rows["seed"] == ["7"]
     assert rows["trials"] == ["200 of 200"]
     assert rows["defenders.0.visibility_radius"][::2] == ["2", "inf"]
-    assert len(page.images) == 4
+    assert len(page.images) == 4 + 5  # with a plane for every player
     for image in page.images:
         assert image["alt"]
         png = base64.b64decode(image["src"].removeprefix("data:image/png;base64,"), validate=True)
