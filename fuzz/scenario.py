@@ -36,11 +36,11 @@ def study(path):
 
 def manifest(path):
     """Read as what describes a store without parts; its digest is made right, so that more than the digest is met."""
-    path.rename(FOLDER / "manifest.json")
+    path.rename(FOLDER / "_manifest.json")
     with contextlib.suppress(ValueError, RecursionError, AttributeError):
-        content = json.loads((FOLDER / "manifest.json").read_bytes())
+        content = json.loads((FOLDER / "_manifest.json").read_bytes())
         content.pop(SEAL, None)
-        (FOLDER / "manifest.json").write_text(json.dumps(content | {SEAL: seal(content)}))
+        (FOLDER / "_manifest.json").write_text(json.dumps(content | {SEAL: seal(content)}))
     made = Manifest.read(FOLDER)
     tadcore.load_study(FOLDER)
     assert made.study == Manifest.read(FOLDER).study, "a manifest changes by being read"

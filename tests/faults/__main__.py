@@ -94,7 +94,7 @@ def disk_full(b):
 def read_only(b):
     folder = b.fresh("read-only", copy=True)
     (folder / "part-000007.parquet").unlink()
-    (folder / "store.lock").unlink(missing_ok=True)
+    (folder / "_store.lock").unlink(missing_ok=True)
     folder.chmod(0o555)
     b.place.chmod(0o755)
     was = os.geteuid()
@@ -163,7 +163,7 @@ def flipped(b):
 def manifest_changed(b):
     """One byte becomes another, half of the times a digit another digit: nothing may be misread."""
     folder, named, times = b.fresh("manifest", copy=True), 0, 400
-    path = folder / "manifest.json"
+    path = folder / "_manifest.json"
     whole = path.read_bytes()
     digits = [at for at, byte in enumerate(whole) if chr(byte).isdigit()]
     for i in range(times):

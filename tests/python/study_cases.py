@@ -73,13 +73,13 @@ def parts(folder):
 
 def edited(folder, **changes):
     """The manifest of a store with some entries changed, its digest left as it was."""
-    path = Path(folder) / "manifest.json"
+    path = Path(folder) / "_manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
 
 
 def resealed(folder, **changes):
     """The manifest with some entries changed and its digest made right again, written down once more."""
-    path = Path(folder) / "manifest.json"
+    path = Path(folder) / "_manifest.json"
     content = json.loads(path.read_text(encoding="utf-8")) | changes
     del content["manifest_sha256"]
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"))

@@ -115,14 +115,15 @@ def gains():
 
 
 def store():
-    """The rows of a stored study, read back."""
+    """The rows of a stored study, read back: its numbers, and its outcomes as words."""
     sc = tadcore.scenarios.load("paper-i1").replace({"step": 0.05})
     vary = {"attacker.position": Box([-3, -2], [3, 4]), "defenders.*.visibility_radius": stats.uniform(0.5, 2.5)}
     study = tadcore.Study(sc, vary, trials=10_000, seed=7)
     with tempfile.TemporaryDirectory() as folder:
         study.run(store=Path(folder) / "store")
         table = tadcore.load_study(Path(folder) / "store").table
-    return digest(*(column.to_numpy() for column in table.columns))
+    numbers = digest(*(column.to_numpy() for column in table.drop_columns(["outcome"]).columns))
+    return {"numbers": numbers, "words": digest(np.array(table["outcome"].to_pylist(), dtype="U16"))}
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from tadcore.sampling.design import CHUNK
 from .plan import Plan
 from .progress import Progress
 from .store import Store
-from .table import table_of
+from .table import schema_of, table_of
 from .workers import LostWorkerError, computed
 
 
@@ -40,8 +40,6 @@ class Collection:
         What the chunks are computed from.
     trials : int
         How many there are to be.
-    schema : pyarrow.Schema
-        The columns of the table.
     store : Store or None
         Where finished chunks are read and kept.
     bar : Progress
@@ -50,10 +48,9 @@ class Collection:
         Asked after every chunk before which none is missing.
     """
 
-    def __init__(
-        self, plan: Plan, trials: int, schema: pa.Schema, store: Store | None, bar: Progress, until: StoppingRule | None
-    ) -> None:
-        self._plan, self._schema, self._store, self._bar, self._until = plan, schema, store, bar, until
+    def __init__(self, plan: Plan, trials: int, store: Store | None, bar: Progress, until: StoppingRule | None) -> None:
+        self._plan, self._store, self._bar, self._until = plan, store, bar, until
+        self._schema = schema_of(plan)
         self._jobs = jobs_of(trials)
         self._tables: dict[int, pa.Table] = {}
         self._stopped: int | None = None
@@ -82,7 +79,7 @@ class Collection:
     def _compute(self, left: list[tuple[int, int]], executor: Executor | None, threads: int | None) -> None:
         with contextlib.closing(computed(self._plan, left, executor, threads)) as results:
             for chunk, outcomes in results:
-                table = table_of(chunk, outcomes, self._schema)
+                table = table_of(chunk, outcomes, self._plan, self._schema)
                 if self._store is not None:
                     self._store.write(chunk, table)
                 self._add(chunk, table)

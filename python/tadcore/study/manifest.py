@@ -1,4 +1,4 @@
-"""What a store says about itself: ``manifest.json``, read only when it is whole.
+"""What a store says about itself: ``_manifest.json``, read only when it is whole.
 
 The last entry is a digest of all others, so that a digit that was changed, by a hand or by a disk, is not taken for
 another study.
@@ -23,8 +23,13 @@ from tadcore.sampling.design import CHUNK, STREAM
 
 Kind = TypeVar("Kind")
 
-FORMAT = 2
-"""Version of the layout of a store; 1 had no digest of the manifest."""
+MANIFEST = "_manifest.json"
+"""Its name: readers of a folder of Parquet files pass over what begins with an underscore."""
+
+FORMAT = 3
+"""Version of the layout of a store; 1 had no digest of the manifest, 2 no ``outcome`` and ``manifest.json``."""
+
+_OLD = "manifest.json"  # its name up to format 2
 
 SEAL = "manifest_sha256"
 """The entry with the digest of all others."""
@@ -74,7 +79,7 @@ class Manifest:
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def to_json(self) -> str:
-        """The text of ``manifest.json``."""
+        """The text of ``_manifest.json``."""
         content = {
             "format": FORMAT,
             "tadcore_version": self.version,
@@ -97,7 +102,8 @@ class Manifest:
     @classmethod
     def read(cls, folder: str | os.PathLike[str]) -> Manifest:
         """The manifest of a store; raises `StoreError` where there is none that can be read."""
-        path = Path(folder) / "manifest.json"
+        path = Path(folder) / MANIFEST
+        refuse_old(Path(folder))
         try:
             found = strange(path)
             if found is not None:
@@ -118,8 +124,7 @@ class Manifest:
         try:
             content = json.loads(data.decode("utf-8"))
             if content["format"] != FORMAT:
-                found = f"it has format {shorten(content['format'])}, and this version of tadcore reads {FORMAT}"
-                raise StoreError(path, found, "read it with the version that wrote it, or run the study anew elsewhere")
+                raise _other_format(path, shorten(content["format"]))
             if content.pop(SEAL) != seal(content):
                 found = "its digest does not fit its content: it was edited or damaged"
                 raise StoreError(path, found, "put back a copy of this file, or run the study anew in another folder")
@@ -145,6 +150,20 @@ class Manifest:
             found = f"its chunks have {manifest.chunk} trials, and this version of tadcore reads {CHUNK}"
             raise StoreError(path, found, "read it with the version that wrote it")
         return manifest
+
+
+def refuse_old(folder: Path) -> None:
+    """Raise `StoreError` for a store of an earlier format."""
+    if (folder / _OLD).exists() and not (folder / MANIFEST).exists():
+        raise _other_format(str(folder / _OLD), "1 or 2")
+
+
+def _other_format(path: str, number: str) -> StoreError:
+    found = f"it has format {number}, and this version of tadcore reads {FORMAT}"
+    remedy = (
+        "read it with the version that wrote it, its parts with any reader of Parquet, or run the study anew elsewhere"
+    )
+    return StoreError(path, found, remedy)
 
 
 def environment() -> dict[str, str]:

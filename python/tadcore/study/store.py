@@ -1,10 +1,10 @@
 """A study on disk: a folder of Parquet parts, one for each finished chunk, and a manifest that says whose they are.
 
-``manifest.json`` holds the scenario, what varies, seed and design, a digest of these, the length and the versions, and
+``_manifest.json`` holds the scenario, what varies, seed and design, a digest of these, the length and the versions, and
 a digest of all its content; ``part-000000.parquet`` holds the rows of chunk 0 of `StudyResult.table`, with the digest
-of the study, the chunk, the number of rows and a digest of the rows in its metadata. Every file appears whole: it is
-written under a temporary name, brought to the disk and renamed. One run at a time writes to a store, under a lock of
-the operating system that ends with the process; any number may read.
+of the study, the chunk, the number of rows and a digest of the rows in its metadata. Every file appears whole. One run
+at a time writes to a store, under ``_store.lock``; any number may read. Readers of Parquet take the folder for one
+table: they pass over names that begin with an underscore or a dot.
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from filelock import FileLock, Timeout
 
 from tadcore._shared.files import PARTIAL, strange, write_whole
-from tadcore.errors import StoreError
+from tadcore.errors import ScenarioError, StoreError
 
-from .manifest import Manifest, environment, reason
-from .table import digest, encoded
+from .lock import alone
+from .manifest import MANIFEST, Manifest, environment, reason, refuse_old
+from .plan import Plan
+from .table import digest, encoded, flaw, schema_of
 
 _PART = re.compile(r"part-(\d{6,})\.parquet")
 _AGAIN = "delete this file and run the study again: only its chunk is computed anew"
@@ -35,47 +37,46 @@ _AGAIN = "delete this file and run the study again: only its chunk is computed a
 class Store:
     """The parts of one study in one folder; made by `Store.writing` or `Store.reading`."""
 
-    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest, schema: pa.Schema) -> None:
+    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest, plan: Plan) -> None:
         self.folder = Path(folder)
         self.manifest = manifest
-        self.schema = schema
+        self.plan = plan
+        self.schema = schema_of(plan)
         self.rows = self._verified()
 
     @classmethod
-    def reading(cls, folder: str | os.PathLike[str], schema: pa.Schema) -> Self:
+    def reading(cls, folder: str | os.PathLike[str], manifest: Manifest, plan: Plan) -> Self:
         """The store as it is, its parts verified."""
-        return cls(folder, Manifest.read(folder), schema)
+        store = cls(folder, manifest, plan)
+        if manifest.columns != plan.columns:
+            found = f"its columns are {list(manifest.columns)}, and what varies has {list(plan.columns)}"
+            raise StoreError(str(Path(folder) / MANIFEST), found, "put back a copy of this file")
+        return store
 
     @classmethod
     @contextlib.contextmanager
-    def writing(cls, folder: str | os.PathLike[str], wanted: Manifest, schema: pa.Schema) -> Iterator[Self]:
+    def writing(cls, folder: str | os.PathLike[str], wanted: Manifest, plan: Plan) -> Iterator[Self]:
         """Make or continue the store of a study, alone; raises `StoreError` where another run or study has it."""
         place = Path(folder)
-        with _faults(place):
-            place.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(place / "store.lock", timeout=0)
-        try:
+        with contextlib.ExitStack() as until_the_end:
             with _faults(place):
-                lock.acquire()
-        except Timeout:
-            raise StoreError(str(place), "another run is writing to it", "wait for its end, or stop it") from None
-        try:
+                place.mkdir(parents=True, exist_ok=True)
+                until_the_end.enter_context(alone(place))
             manifest = _agreed(place, wanted)
             for partial in [*place.glob(f"{PARTIAL}*.parquet"), *place.glob(f"{PARTIAL}*.json")]:
                 with _faults(partial):
                     partial.unlink()  # left by a run that was killed
-            if manifest.trials != wanted.trials or not (place / "manifest.json").exists():
+            if manifest.trials != wanted.trials or not (place / MANIFEST).exists():
                 manifest = replace(manifest, trials=max(manifest.trials, wanted.trials))
-                _write(place / "manifest.json", manifest.to_json())
-            yield cls(place, manifest, schema)
-        finally:
-            lock.release()
+                _write(place / MANIFEST, manifest.to_json())
+            yield cls(place, manifest, plan)
 
     def read(self, chunk: int) -> pa.Table:
         """The outcomes of a chunk, its pages verified."""
         path = self._part(chunk)
         try:
-            table = pq.read_table(path, page_checksum_verification=True, memory_map=False)
+            with pq.ParquetFile(path, page_checksum_verification=True) as part:
+                table = part.read()
             said = (table.schema.metadata or {}).get(b"tadcore_sha256", b"").decode()
             table = table.cast(self.schema)
             whole = len(table) == self.rows[chunk] and digest(table) == said
@@ -83,6 +84,15 @@ class Store:
             raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
         if not whole:
             raise StoreError(str(path), "it is damaged (its rows are not those that were written)", _AGAIN)
+        # A digest tells an accident, not an intention: what cannot be an outcome is none, whatever is said of it.
+        found = flaw(table, chunk, self.plan.scenario)
+        if found is None:
+            try:
+                self.plan.check(chunk, np.stack([table[name].to_numpy() for name in self.plan.columns], axis=1))
+            except ScenarioError as error:
+                found = str(error)
+        if found is not None:
+            raise StoreError(str(path), f"its rows are no outcomes of this study ({found})", _AGAIN)
         return table
 
     def write(self, chunk: int, table: pa.Table) -> None:
@@ -96,7 +106,7 @@ class Store:
         """Note after how many trials a stopping rule held."""
         if trials != self.manifest.stopped:
             self.manifest = replace(self.manifest, stopped=trials)
-            _write(self.folder / "manifest.json", self.manifest.to_json())
+            _write(self.folder / MANIFEST, self.manifest.to_json())
 
     def _part(self, chunk: int) -> Path:
         return self.folder / f"part-{chunk:06d}.parquet"
@@ -133,14 +143,15 @@ class Store:
             raise StoreError(str(path), f"it holds chunk {said['chunk']}, not {chunk}", "give it its name back")
         if said["rows"] != str(rows) or not 0 < rows <= self.manifest.chunk:
             raise StoreError(str(path), f"it has {rows} rows, and says {said['rows']}", _AGAIN)
-        if not named or not schema.remove_metadata().equals(self.schema):
+        if not named or not schema.equals(self.schema):
             raise StoreError(str(path), f"its columns are {schema.names}, not {self.schema.names}", _AGAIN)
         return int(rows)
 
 
 def _agreed(place: Path, wanted: Manifest) -> Manifest:
     """The manifest that is there if it is this study's, or the one to write."""
-    if not (place / "manifest.json").exists():
+    refuse_old(place)
+    if not (place / MANIFEST).exists():
         if any(place.glob("part-*.parquet")):
             raise StoreError(str(place), "it holds parts but no manifest", "name another folder for the store")
         return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=environment())
@@ -167,8 +178,6 @@ def _faults(path: Path) -> Iterator[None]:
     """What the operating system refuses, in the words of a store."""
     try:
         yield
-    except Timeout:
-        raise
     except OSError as error:
         found = f"it cannot be written or read ({reason(error)})"
         remedy = "nothing that was finished is lost: make room or name a folder that can be written, and run again"

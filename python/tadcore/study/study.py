@@ -48,7 +48,6 @@ from .manifest import Manifest
 from .plan import Plan
 from .progress import Progress
 from .store import Store
-from .table import schema_of
 from .trials import Trials
 from .warm_start import warm
 
@@ -245,10 +244,9 @@ class Study:
         kept_table = None if table is None else as_path("table", table)
         self._plan.check_ahead(self.trials, progress=bool(progress))
         game_of(self.scenario).equilibrium()
-        schema = schema_of(self.columns)
-        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), schema)
+        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), self._plan)
         with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:
-            chunks = Collection(self._plan, self.trials, schema, kept, bar, until)
+            chunks = Collection(self._plan, self.trials, kept, bar, until)
             return StudyResult(self, chunks.gather(executor, workers))
 
     def _manifest(self) -> Manifest:
@@ -274,8 +272,9 @@ class StudyResult(Trials):
     study : Study
         What was asked for.
     table : pyarrow.Table
-        One row for each trial: ``trial``, ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none
-        intercepted), ``time``, and a column for each varied component, such as ``attacker.position.x``.
+        One row for each trial: ``trial``, ``outcome`` (categorical: ``"timeout"``, ``"captured"``, ``"d1"``, …),
+        ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none intercepted), ``time``, and a column for
+        each varied component, such as ``attacker.position.x``. The metadata of the schema explains each.
     scenario : Scenario
         The scenario around which the inputs vary.
     seed : int
@@ -377,10 +376,9 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
         seed=manifest.seed,
         design=manifest.design,  # type: ignore[arg-type]  # the constructor checks it
     )
-    schema = schema_of(manifest.columns)
-    store = Store.reading(folder, schema)
+    store = Store.reading(folder, manifest, study._plan)
     wanted = manifest.trials if manifest.stopped is None else manifest.stopped
-    tables = [schema.empty_table()]
+    tables = [store.schema.empty_table()]
     chunk = 0
     while wanted > 0 and chunk in store.rows:
         tables.append(store.read(chunk).slice(0, wanted))

@@ -1,14 +1,9 @@
 """The outcomes of a study as Arrow tables, and their bytes as Parquet.
 
-=============  =======  ======================================================================
-column         type     meaning
-=============  =======  ======================================================================
-``trial``      int64    number of the trial, from 0
-``kind``       int8     code of `tadcore.OutcomeKind`
-``defender``   int32    the intercepting defender, 0-based; -1 where none intercepted
-``time``       float64  the instant of the end
-an input       float64  one for each varied component, such as ``attacker.position.x``
-=============  =======  ======================================================================
+The columns that every study has are `FIXED`; behind them stands one for each varied component, a float64 such as
+``attacker.position.x``. What a column means and its unit are in the metadata of its field; version, scenario, seed,
+design and the meanings again, as JSON for readers that see no fields' metadata, in the metadata of the schema. So a
+part explains itself, to any reader of Parquet.
 
 The bytes of a part depend on its rows and its study alone: the settings of the writer are fixed, and no date is in it.
 """
@@ -16,54 +11,145 @@ The bytes of a part depend on its rows and its study alone: the settings of the 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
+from tadcore import _core
+from tadcore.game.outcome import OutcomeKind
 from tadcore.sampling.design import CHUNK
+from tadcore.scenario.model import Scenario
 
-from .plan import Outcomes
+from .plan import Outcomes, Plan
 
-FIXED = {"trial": pa.int64(), "kind": pa.int8(), "defender": pa.int32(), "time": pa.float64()}
+_UNIT = "1"  # everything is dimensionless, as in the paper
 
 
-def schema_of(columns: Sequence[str]) -> pa.Schema:
+@dataclass(frozen=True)
+class Column:
+    """A column that every study has: its type, what it means, and its values for the trials from a first one on."""
+
+    type: pa.DataType
+    meaning: str
+    values: Callable[[int, Outcomes, Scenario], Any]
+    unit: str = ""
+
+
+def outcome_names(n: int) -> list[str]:
+    """The categories of ``outcome``: the ends without an interception, then the defenders."""
+    return ["timeout", "captured", *(f"d{i + 1}" for i in range(n))]
+
+
+def _outcome(kind: NDArray[Any], defender: NDArray[Any], sc: Scenario) -> pa.DictionaryArray:
+    code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+    return pa.DictionaryArray.from_arrays(code.astype(np.int32), pa.array(outcome_names(sc.n)))
+
+
+FIXED = {
+    "trial": Column(
+        pa.int64(), "number of the trial, from 0", lambda first, o, _: np.arange(first, first + len(o.kind))
+    ),
+    "outcome": Column(
+        pa.dictionary(pa.int32(), pa.string()),
+        "how the game ended: timeout, captured (the attacker reached the target), or the defender that intercepted",
+        lambda _, o, sc: _outcome(o.kind, o.defender, sc),
+    ),
+    "kind": Column(
+        pa.int8(), "code of tadcore.OutcomeKind: 0 timeout, 1 captured, 2 intercepted", lambda _, o, __: o.kind
+    ),
+    "defender": Column(
+        pa.int32(),
+        "the intercepting defender from 0, d1 being 0; -1 where none intercepted",
+        lambda _, o, __: o.defender,
+    ),
+    "time": Column(pa.float64(), "the instant of the end, as the horizon T", lambda _, o, __: o.time, _UNIT),
+}
+_INPUTS = {
+    "position": "where the player starts, one coordinate",
+    "visibility_radius": "how far the player sees; inf without limit",
+    "capture_radius": "how near the player must come to intercept or capture",
+}
+
+
+def schema_of(plan: Plan) -> pa.Schema:
     """The schema of a study's table; no entry is ever missing."""
-    inputs = {name: pa.float64() for name in columns}
-    return pa.schema([pa.field(name, kind, nullable=False) for name, kind in {**FIXED, **inputs}.items()])
+    inputs = {name: (pa.float64(), _INPUTS[q.field], _UNIT) for q in plan.quantities for name in q.columns}
+    columns = {name: (column.type, column.meaning, column.unit) for name, column in FIXED.items()} | inputs
+    about = {
+        name: {"meaning": meaning} | ({"unit": unit} if unit else {}) for name, (_, meaning, unit) in columns.items()
+    }
+    fields = [pa.field(name, columns[name][0], nullable=False, metadata=about[name]) for name in columns]
+    said = {
+        "version": _core.__version__,
+        "scenario": plan.scenario.to_toml(),
+        "seed": str(plan.seed),
+        "design": plan.design,
+        "columns": json.dumps(about),
+    }
+    return pa.schema(fields, {f"tadcore_{key}": value for key, value in said.items()})
 
 
-def table_of(chunk: int, outcomes: Outcomes, schema: pa.Schema) -> pa.Table:
+def table_of(chunk: int, outcomes: Outcomes, plan: Plan, schema: pa.Schema) -> pa.Table:
     """One chunk as a table."""
-    first = chunk * CHUNK
-    trial = np.arange(first, first + len(outcomes.kind), dtype=np.int64)
-    inputs = np.ascontiguousarray(outcomes.inputs.T)
-    arrays = [trial, outcomes.kind, outcomes.defender, outcomes.time, *inputs]
+    fixed = [column.values(chunk * CHUNK, outcomes, plan.scenario) for column in FIXED.values()]
+    arrays = [*fixed, *np.ascontiguousarray(outcomes.inputs.T)]
     return pa.Table.from_arrays([pa.array(array) for array in arrays], schema=schema)
 
 
+def flaw(table: pa.Table, chunk: int, sc: Scenario) -> str | None:
+    """What no study could have written, in words; None where every row of a chunk can be how a game ended."""
+    first = chunk * CHUNK
+    kind, defender, time = (table[name].to_numpy() for name in ("kind", "defender", "time"))
+    with np.errstate(invalid="ignore"):
+        on_grid = np.abs(time / sc.step - np.round(time / sc.step)) <= 1e-6
+    within = (time >= 0.0) & (time <= sc.horizon * (1.0 + 1e-9))
+    last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon)
+    one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
+    known = np.isin(kind, list(OutcomeKind))
+    same = pc.equal(
+        pc.cast(table["outcome"], pa.string()), pc.cast(_outcome(kind * known, one * defender, sc), pa.string())
+    )
+    rules = {
+        "trial": (table["trial"].to_numpy() == np.arange(first, first + len(kind)), "the number of its row"),
+        "kind": (known, "a code of tadcore.OutcomeKind"),
+        "defender": (one, "a defender where one intercepted, and -1 elsewhere"),
+        "time": (on_grid & within & last, f"an instant of the grid up to T = {sc.horizon:g}, for a timeout T itself"),
+        "outcome": (same.to_numpy(), "what kind and defender say"),
+    }
+    for name, (holds, rule) in rules.items():
+        if not holds.all():
+            row = int(np.argmin(holds))
+            return f"trial {first + row:,} has the {name} {table[name][row].as_py()!r}, and it must be {rule}"
+    return None
+
+
 def digest(table: pa.Table) -> str:
-    """SHA-256 of every number of a table, column after column.
+    """SHA-256 of every number of a table, column after column; ``outcome`` says nothing that they do not.
 
     The checksums of Parquet cover its pages alone: a bit that flips in the footer can make whole pages read as others.
     """
     total = hashlib.sha256()
-    for column in table.columns:
+    for column in table.drop_columns(["outcome"]).columns:
         total.update(column.to_numpy().tobytes())
     return total.hexdigest()
 
 
 def encoded(table: pa.Table, metadata: dict[str, str]) -> bytes:
-    """A table as the bytes of a Parquet file, with checksums on its pages."""
+    """A table as the bytes of a Parquet file, with more metadata, and with checksums on its pages."""
     sink = pa.BufferOutputStream()
     pq.write_table(
-        table.replace_schema_metadata(metadata),
+        table.replace_schema_metadata({**table.schema.metadata, **metadata}),
         sink,
         version="2.6",
         compression="zstd",
-        use_dictionary=["kind", "defender", "time"],
+        use_dictionary=["outcome", "kind", "defender", "time"],
         row_group_size=CHUNK,
         write_page_checksum=True,
     )

@@ -47,7 +47,7 @@ def test_what_is_no_file_is_refused_before_it_is_opened(tmp_path, kind, read):
 
 
 @KINDS
-@pytest.mark.parametrize("name", ["manifest.json", "part-000000.parquet"])
+@pytest.mark.parametrize("name", ["_manifest.json", "part-000000.parquet"])
 def test_what_is_no_file_is_refused_in_a_store(tmp_path, kind, name):
     folder = tmp_path / "store"
     study(300).run(store=folder)
@@ -111,7 +111,7 @@ def test_a_file_too_large_is_not_read_to_its_end(tmp_path):
         Scenario.from_toml(tmp_path / "large.toml")
     folder = tmp_path / "store"
     study(300).run(store=folder)
-    with (folder / "manifest.json").open("r+b") as stream:
+    with (folder / "_manifest.json").open("r+b") as stream:
         stream.truncate(1 << 40)
     with pytest.raises(StoreError, match="it has more than 8 MiB"):
         tadcore.load_study(folder)
@@ -165,12 +165,12 @@ def test_no_message_moves_the_cursor_of_a_terminal(tmp_path, capsys):
     study(300).run(store=tmp_path / "store")
     for changes in ({"format": HIDDEN}, {"design": HIDDEN}, {"created": [HIDDEN]}, {"vary": {HIDDEN: {HIDDEN: 1}}}):
         folder = tmp_path / "store"
-        before = (folder / "manifest.json").read_bytes()
+        before = (folder / "_manifest.json").read_bytes()
         resealed(folder, **changes)
         with pytest.raises((StoreError, ScenarioError)) as refused:
             tadcore.load_study(folder)
         assert str(refused.value).isprintable()
-        (folder / "manifest.json").write_bytes(before)
+        (folder / "_manifest.json").write_bytes(before)
 
 
 def test_a_long_name_does_not_fill_the_screen():

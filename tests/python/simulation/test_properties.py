@@ -117,6 +117,6 @@ def test_a_manifest_loses_nothing(tmp_path_factory, sc, seed, design):
         "defenders.0.visibility_radius": {"values": [1.0, math.inf]},
     }
     wanted = Manifest(sc.to_toml(), vary, seed, design, 100, ("attacker.position.x",))
-    (folder / "manifest.json").write_text(wanted.to_json(), encoding="utf-8")
+    (folder / "_manifest.json").write_text(wanted.to_json(), encoding="utf-8")
     assert Manifest.read(folder) == wanted
     assert Scenario.from_toml_string(Manifest.read(folder).scenario) == sc

@@ -42,9 +42,9 @@ def copied(clean, tmp_path):
 
 def test_a_store_says_what_it_holds(clean):
     result, folder = clean
-    assert {path.name for path in folder.iterdir()} <= {"manifest.json", "store.lock", *parts(folder)}
+    assert {path.name for path in folder.iterdir()} <= {"_manifest.json", "_store.lock", *parts(folder)}
     assert list(parts(folder)) == [f"part-00000{i}.parquet" for i in range(3)]
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    manifest = json.loads((folder / "_manifest.json").read_text(encoding="utf-8"))
     assert manifest["trials"] == result.trials == 2 * CHUNK + 500
     assert (manifest["seed"], manifest["design"], manifest["chunk"]) == (7, "random", CHUNK)
     assert manifest["tadcore_version"] == tadcore.__version__
@@ -190,7 +190,7 @@ def test_another_study_is_refused_and_nothing_is_touched(copied, clean, changes,
     with pytest.raises(StoreError, match=rf"it holds another study \(its {differs} differ\)"):
         study(**changes).run(store=copied)
     assert parts(copied) == parts(clean[1])
-    assert (copied / "manifest.json").read_bytes() == (clean[1] / "manifest.json").read_bytes()
+    assert (copied / "_manifest.json").read_bytes() == (clean[1] / "_manifest.json").read_bytes()
 
 
 def spoiled(folder, name, change):
@@ -254,23 +254,23 @@ def test_a_part_with_other_columns_or_rows_is_named(copied, drop, words):
 def test_a_manifest_that_is_none_is_named(copied, tmp_path):
     for use in (tadcore.load_study, lambda folder: study().run(store=folder)):
         for changes in ({"seed": 8}, {"trials": 100}, {"stopped": 100}, {"columns": []}, {"tadcore_version": "0.0.1"}):
-            before = (copied / "manifest.json").read_bytes()
+            before = (copied / "_manifest.json").read_bytes()
             edited(copied, **changes)
             with pytest.raises(StoreError, match=r"manifest\.json: its digest does not fit.*put back a copy"):
                 use(copied)
-            (copied / "manifest.json").write_bytes(before)
-    for other in (1, 99):
+            (copied / "_manifest.json").write_bytes(before)
+    for other in (1, 2, 99):
         edited(copied, format=other)
-        with pytest.raises(StoreError, match=f"it has format {other}, and this version of tadcore reads 2; read"):
+        with pytest.raises(StoreError, match=f"it has format {other}, and this version of tadcore reads 3; read"):
             study().run(store=copied)
-    resealed(copied, format=2, tadcore_version="0.0.1")
+    resealed(copied, format=3, tadcore_version="0.0.1")
     assert tadcore.load_study(copied).trials == study().trials
     with pytest.raises(StoreError, match=r"written by tadcore 0\.0\.1"):
         study().run(store=copied)
-    (copied / "manifest.json").write_text("{", encoding="utf-8")
+    (copied / "_manifest.json").write_text("{", encoding="utf-8")
     with pytest.raises(StoreError, match="it is no manifest of a study"):
         study().run(store=copied)
-    (copied / "manifest.json").unlink()
+    (copied / "_manifest.json").unlink()
     with pytest.raises(StoreError, match="it holds parts but no manifest"):
         study().run(store=copied)
     for folder in (copied, tmp_path / "nowhere"):
@@ -347,7 +347,7 @@ def test_a_store_that_cannot_be_written_is_refused(copied, tmp_path):
     with pytest.raises(StoreError, match="it cannot be written"):
         study().run(store=tmp_path / "taken")
     copied.chmod(0o555)
-    (copied / "store.lock").unlink(missing_ok=True)
+    (copied / "_store.lock").unlink(missing_ok=True)
     with nobody(), pytest.raises(StoreError, match="it cannot be written"):
         study(3 * CHUNK).run(store=copied)
     copied.chmod(0o755)
@@ -402,6 +402,6 @@ def test_infinite_radii_and_distributions_come_back(tmp_path):
     }
     result = study(300, vary=vary).run(store=tmp_path)
     loaded = tadcore.load_study(tmp_path)
-    assert "Infinity" not in (tmp_path / "manifest.json").read_text(encoding="utf-8")
+    assert "Infinity" not in (tmp_path / "_manifest.json").read_text(encoding="utf-8")
     assert loaded.study.run(store=tmp_path).table.equals(result.table)
     assert loaded.study.run().table.equals(result.table)

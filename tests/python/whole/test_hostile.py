@@ -101,22 +101,22 @@ def test_a_manifest_names_only_distributions(store, sampler):
 
 @pytest.mark.parametrize(
     "text",
-    ["[" * 100_000, '{"format": ' * 5000, "[]", "7", '{"format": 2, "seed": Infinity}', "{}", "\x00", "1" * 5000],
+    ["[" * 100_000, '{"format": ' * 5000, "[]", "7", '{"format": 3, "seed": Infinity}', "{}", "\x00", "1" * 5000],
     ids=["deep list", "deep table", "list", "number", "infinite", "empty", "nul", "digits"],
 )
 def test_no_manifest_is_worse_than_refused(store, text):
-    (store / "manifest.json").write_text(text, encoding="utf-8")
+    (store / "_manifest.json").write_text(text, encoding="utf-8")
     with pytest.raises(StoreError, match="no manifest of a study"):
         Manifest.read(store)
 
 
 def test_what_is_infinite_or_huge_in_a_manifest_is_refused(store):
     for changes in ({"seed": float("inf")}, {"seed": -1}, {"trials": 10**30}, {"design": "../../x"}, {"chunk": 2**50}):
-        original = (store / "manifest.json").read_text(encoding="utf-8")
+        original = (store / "_manifest.json").read_text(encoding="utf-8")
         resealed(store, **changes)
         with pytest.raises((StoreError, ScenarioError)):
             tadcore.load_study(store)
-        (store / "manifest.json").write_text(original, encoding="utf-8")
+        (store / "_manifest.json").write_text(original, encoding="utf-8")
 
 
 def test_rows_are_bounded_by_this_version_and_not_by_the_file(store):
@@ -133,7 +133,7 @@ def test_rows_are_bounded_by_this_version_and_not_by_the_file(store):
 
 def test_no_byte_of_a_manifest_can_change_unseen(store):
     """Every byte with each of its bits flipped, as another digit, left out and doubled: refused, or nothing changed."""
-    whole = (store / "manifest.json").read_bytes()
+    whole = (store / "_manifest.json").read_bytes()
     manifest, harmless = Manifest.read(store), 0
     for at, byte in enumerate(whole):
         before, after = whole[:at], whole[at + 1 :]
@@ -141,7 +141,7 @@ def test_no_byte_of_a_manifest_can_change_unseen(store):
         others += [b"%d" % digit for digit in range(10) if chr(byte).isdigit() and byte != ord("0") + digit]
         for other in (*others, b"", bytes([byte, byte])):
             try:
-                assert Manifest.from_json(before + other + after, "manifest.json") == manifest
+                assert Manifest.from_json(before + other + after, "_manifest.json") == manifest
             except StoreError:
                 continue
             harmless += 1
@@ -179,7 +179,7 @@ def test_numbers_that_were_changed_with_care_are_found(store):
         tadcore.load_study(store)
 
 
-@pytest.mark.parametrize("name", ["store.lock", "part-000001.parquet", ".part-000001.parquet.tmp", "manifest.json"])
+@pytest.mark.parametrize("name", ["_store.lock", "part-000001.parquet", ".tadcore-a.parquet", "_manifest.json"])
 @pytest.mark.parametrize("there", [True, False])
 def test_links_out_of_a_store_are_not_written_through(store, tmp_path, name, there):
     victim = tmp_path / "victim"
