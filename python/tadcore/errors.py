@@ -233,7 +233,8 @@ class VerificationError(TadcoreError, AssertionError):
 
     def __str__(self) -> str:
         state, advice = ("not accepted", self.remedy) if self.converged else ("not converged", UNDECIDED)
-        return f"{self.check}: {state}, measured {self.value:.3g} where at most {self.bound:.3g} passes; {advice}"
+        found = f"measured {self.value:.3g}" if self.converged or math.isfinite(self.value) else "could not be measured"
+        return f"{self.check}: {state}, {found} where at most {self.bound:.3g} passes; {advice}"
 
 
 def _collect(cls: type[ScenarioError], errors: tuple[ScenarioError, ...]) -> ScenarioError:

@@ -15,6 +15,9 @@ from tadcore.scenario.model import Scenario
 FAILED = 1
 """The exit code of a game without an equilibrium, and of a check that failed."""
 
+UNDECIDED = 3
+"""The exit code of a verification in which nothing failed and something could not be decided."""
+
 Source = Annotated[str, typer.Argument(metavar="SCENARIO", help="A TOML file, or the name of a bundled scenario.")]
 Changes = Annotated[
     list[str] | None,

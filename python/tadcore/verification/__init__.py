@@ -1,4 +1,4 @@
-"""Numerical checks of the paper's theorems: Nash property, indices, minima of Θ, symmetries, dependence on the step.
+"""Numerical checks of a record and of the paper's theorems: Nash property, indices, minima of Θ, symmetries, the step.
 
 `verify` runs every check on a scenario or on a run and returns a `VerificationReport`. The pieces can be called alone:
 
@@ -9,7 +9,7 @@ module                                       what it answers
                                              (thm:fbne, thm:zero:sum:game)
 ``oracle.adapted``, ``checks.adapted_nash``  S, ΔQ^Ad, the indices J^Ad in continuous time and their identities
                                              (thm:thm1, thm:thm2)
-``checks.record``                            is the record what the equations say
+``checks.record``, ``checks.claims``         is everything that a run records what the scenario and the equations say
 ``checks.consistency``                       full observation gives the equilibrium (thm:consistency); how far the
                                              indices are from the players' own
 ``checks.gains``, ``oracle.objective``       gradient, curvature in full blocks, other starts, share of certified gains
@@ -24,7 +24,10 @@ module                                       what it answers
 `control_jumps`                              the jump of every player's control at every change of the network
 ===========================================  ==========================================================================
 
-Everything here is computed by NumPy and SciPy from the scenario's weights and the record.
+NumPy and SciPy alone compute everything in ``oracle``, and with it every check of a record, of P(t) and of the
+indices, from the scenario's weights, the record and P(t). ``docs/verification.md`` lists the checks that compare the
+library with itself: consistency, geometry, steps, the central side of the protocol, the counts of the solver, and the
+finer P that a regret on a coarse grid needs.
 """
 
 from tadcore.errors import VerificationError

@@ -7,8 +7,9 @@ import numpy as np
 from tadcore._shared.arrays import Floats
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.oracle.adapted import Adapted
+from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution
-from tadcore.verification.report import Check, Measurement, VerificationReport
+from tadcore.verification.report import Check, Measurement, VerificationReport, number
 
 _IDENTITY = 1e-10
 _REMEDY = "the values P(t) do not belong to this game, or the step is too long for the quadrature (‖C‖δ > 1)"
@@ -46,20 +47,22 @@ def check_nafne(
     for index in adapted.index(sampled=False):
         name = f"nafne.value.{index.party}"
         checks.append(
-            Check(name, index.error, _IDENTITY, index.converged, _REMEDY, theorem, f"V(0) = {index.initial:.6g}")
+            Check(name, index.error, _IDENTITY, index.converged, _REMEDY, theorem, f"V(0) = {number(index.initial)}")
         )
     for index in adapted.index(sampled=True):
         name = f"nafne.as_played.{index.party}"
         gap = index.value - index.initial
         checks.append(
-            Check(name, index.error, _IDENTITY, index.converged, _REMEDY, identity, f"J^Ad - V(0) = {gap:.3g}")
+            Check(
+                name, index.error, _IDENTITY, index.converged, _REMEDY, identity, f"J^Ad - V(0) = {number(gap, '.3g')}"
+            )
         )
         measured.append(Measurement(f"nafne.gap.{index.party}", gap, "J^Ad as played minus V(0): frozen feedback"))
     for player, label in enumerate(run.scenario.players):
         largest, gain, resolved = 0.0, -np.inf, True
         party, sign = adapted.party_of(player)
         for draw in range(deviations):
-            rng = np.random.Generator(np.random.Philox(key=[seed, player * 2**32 + draw]))
+            rng = generator(seed, player * 2**32 + draw)
             deviation = adapted.random_deviation(player, rng)
             if deviation is None:
                 notes.append(f"{label} sees nobody in this run and can only stand still: it has no deviation")

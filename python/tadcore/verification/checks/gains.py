@@ -22,8 +22,10 @@ from tadcore.game.synthesis import synthesize
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run
 from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_clarabel
+from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
+from tadcore.verification.oracle.optimality import optimality
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
 _GRADIENT, _CURVATURE, _LOWER, _BELOW = 1e-9, 1e-9, 1e-8, 1e-10
@@ -101,14 +103,9 @@ def check_gains(
     unconverged = float(run.unconverged)
     checks = [Check("gains.solver", unconverged, 0.0, True, remedy, label, "instants short of the tolerance")]
 
-    steepest, at = 0.0, 0
-    for k in range(length):
-        reduced = FullObjective(sc, m, values[:, k], run.adjacency[k], dim=1)
-        x = reduced.blocks(run.gains[k])
-        slope = float(np.linalg.norm(reduced.gradient(x)))
-        relative = slope / max(reduced.gradient_scale(x), 1e-300) if slope else 0.0
-        if not relative <= steepest:
-            steepest, at = relative, k
+    slopes = optimality(sc, m, values[:, :length], run.adjacency[:length], run.gains[:length]).gradient
+    at = int(np.argmax(slopes))
+    steepest = float(slopes[at])
     remedy = "the gains are not critical points of Θ: they are not what the synthesis gives"
     where = f"t = {run.times[at]:.6g}"
     checks.append(Check("gains.gradient", steepest, _GRADIENT, True, remedy, "eq:errgradient", where))
@@ -123,7 +120,7 @@ def check_gains(
             flattest = min(flattest, low / high)
         if starts and objective.unknowns:
             here = objective.theta(x)
-            rng = np.random.Generator(np.random.Philox(key=[seed, k]))
+            rng = generator(seed, k)
             lower = float(here - multistart(objective, x, starts, rng)) / max(here, 1e-10 * objective.theta(0.0 * x))
             if lower > worst:
                 worst, where_lower = lower, k
@@ -229,7 +226,7 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
     counts = dict.fromkeys(("converged", "certified", "curved", "beaten", "beaten_certified"), 0)
     found_from: dict[str, int] = {}
     for trial in range(trials):
-        rng = np.random.Generator(np.random.Philox(key=[seed, trial]))
+        rng = generator(seed, trial)
         k, adjacency = int(rng.integers(sc.steps + 1)), rng.random(shape) < rng.random()
         found = synthesize(sc, step=k, adjacency=adjacency)
         objective = FullObjective(sc, m, values[:, k], adjacency)

@@ -16,6 +16,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run, simulate
+from tadcore.verification.oracle.draws import generator
 from tadcore.verification.report import Check, VerificationReport
 
 _LINE, _SAME, _DECIDED = 1e-10, 1e-8, 1e-11
@@ -147,7 +148,7 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
         notes.append("everyone with limited sight starts within a capture radius of someone: no radius to delay")
 
     decided = _margin(run) > _DECIDED
-    rng = np.random.Generator(np.random.Philox(key=[seed, 2**40]))
+    rng = generator(seed, 2**40)
     turn = np.linalg.qr(rng.normal(size=(sc.dim, sc.dim)))[0]
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     mirror = np.diag([-1.0] + [1.0] * (sc.dim - 1))

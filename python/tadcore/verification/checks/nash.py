@@ -17,8 +17,8 @@ from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.scenario.model import Scenario
 from tadcore.verification.oracle.flow import riccati_within
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, stacked_rows
-from tadcore.verification.oracle.responses import REGRET, best_responses, is_smooth
-from tadcore.verification.report import Check, Measurement, VerificationReport
+from tadcore.verification.oracle.responses import REGRET, BestResponse, best_responses, is_smooth
+from tadcore.verification.report import Check, Measurement, VerificationReport, number
 
 _FEWEST, _MOST = 800, 6400
 _DEFECT, _TERMINAL, _FEEDBACK = 1e-10, 1e-14, 1e-12
@@ -51,7 +51,9 @@ def riccati_defect(sc: Scenario, equilibrium: FeedbackSolution) -> dict[str, Flo
     return dict(zip(m.parties, relative, strict=True))
 
 
-def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None) -> VerificationReport:
+def check_equilibrium(
+    sc: Scenario, equilibrium: FeedbackSolution | None = None, *, refine: bool | None = None
+) -> VerificationReport:
     """Check that a Riccati solution solves its equations and that its feedback is a Nash equilibrium.
 
     Parameters
@@ -60,6 +62,9 @@ def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None)
         The game and its initial state.
     equilibrium : Equilibrium, optional
         What to check; `tadcore.solve_equilibrium` of the scenario by default.
+    refine : bool, optional
+        Whether the regret may be that of the library's solution at more instants, where the grid is too coarse to play
+        between its instants; by default only if `equilibrium` is not given.
 
     Returns
     -------
@@ -67,36 +72,46 @@ def check_equilibrium(sc: Scenario, equilibrium: FeedbackSolution | None = None)
         Riccati defect and terminal value, feedback rows, and the regret of each party relative to what it pays.
     """
     eq = solve_equilibrium(sc) if equilibrium is None else equilibrium
+    refine = equilibrium is None if refine is None else refine
     m = matrices_of(sc)
     values = m.values(eq.P)
     rows = stacked_rows(eq.feedback, sc.players)
     theorem = "thm:fbne" if sc.interaction == "I1" else "thm:zero:sum:game"
     riccati, law = ("eq:Riccati", "eq:1d") if sc.interaction == "I1" else ("eq:RDE", "eq:zero_sum_control1, 2")
-    checks = []
+    checks, followed = [], True
     for party, defect in riccati_defect(sc, eq).items():
         k = int(np.argmax(defect))
         remedy = "P does not solve its equation there: solve the equilibrium again, and report this scenario"
-        where = f"t = {float(eq.times[k]):.6g}"
         value = float(defect[k])
+        followed &= value < np.inf
+        where = f"t = {float(eq.times[k]):.6g}" if value < np.inf else "the flow inside a step is too stiff to follow"
         checks.append(Check(f"fne.riccati.{party}", value, _DEFECT, value < np.inf, remedy, riccati, where))
     terminal = float(np.abs(values[:, -1] - m.F).max() / np.abs(m.F).max())
     remedy = "P(T) must be the terminal weights"
     checks.append(Check("fne.terminal", terminal, _TERMINAL, True, remedy, f"{theorem}, P(T) = F"))
-    off = np.abs(rows - m.rows(values)).max(axis=(1, 2))
-    own = float(off.max() / max(np.abs(rows).max(), 1e-300))
+    given = m.rows(values)
+    off = np.abs(rows - given).max(axis=(1, 2)) / np.maximum(np.abs(given).max(axis=(1, 2)), 1e-300)
+    k = int(np.argmax(off))
     remedy = "the feedback must be that of P, u = -R⁻¹BᵀPz"
-    checks.append(Check("fne.feedback", own, _FEEDBACK, True, remedy, law, f"t = {eq.times[int(off.argmax())]:.6g}"))
+    checks.append(Check("fne.feedback", float(off[k]), _FEEDBACK, True, remedy, law, f"t = {eq.times[k]:.6g}"))
     measured = []
-    fine = sc
-    while equilibrium is None and (fine.steps < _FEWEST or (fine.steps < _MOST and not is_smooth(fine, rows))):
-        # the same equilibrium at more instants, to play between them
-        fine = sc.replace(step=sc.horizon / (sc.steps * -(-max(2 * fine.steps, _FEWEST) // sc.steps)))
-        rows = stacked_rows(solve_equilibrium(fine).feedback, sc.players)
-    for found in best_responses(fine, rows):
+    for found in _responses(sc, rows, refine=refine, followed=followed):
         remedy = f"{found.party} gain by deviating: this feedback is no equilibrium of this game"
-        name, where = f"fne.regret.{found.party}", f"J = {found.cost:.6g}"
+        name, where = f"fne.regret.{found.party}", f"J = {number(found.cost)}"
         checks.append(Check(name, abs(found.relative), REGRET, found.converged, remedy, theorem, where))
         measured.append(
             Measurement(f"fne.J.{found.party}", found.cost, "cost of the equilibrium from this start, to T")
         )
     return VerificationReport(f"equilibrium of {sc!r}", tuple(checks), tuple(measured))
+
+
+def _responses(sc: Scenario, rows: Floats, *, refine: bool, followed: bool) -> tuple[BestResponse, ...]:
+    """The best responses to the feedback, at more instants where the grid needs them; nan where P(t) is too stiff."""
+    if not followed:  # what P does inside a step is not known: there is nothing to respond to
+        return tuple(BestResponse(party, np.nan, np.nan, False, np.nan) for party in matrices_of(sc).parties)
+    fine = sc
+    while refine and (fine.steps < _FEWEST or (fine.steps < _MOST and not is_smooth(fine, rows))):
+        # the same equilibrium at more instants, to play between them
+        fine = sc.replace(step=sc.horizon / (sc.steps * -(-max(2 * fine.steps, _FEWEST) // sc.steps)))
+        rows = stacked_rows(solve_equilibrium(fine).feedback, sc.players)
+    return best_responses(fine, rows)

@@ -57,7 +57,7 @@ class Index:
     scale : float
         ½∫|integrand| and the terminal term: what rounding is relative to.
     converged : bool
-        Whether the steps are short enough for the quadrature: ‖C‖δ ≤ 1 throughout.
+        Whether the steps are short enough for the quadrature, ‖C‖δ ≤ 1 throughout, and nothing overflows.
     """
 
     party: str
@@ -104,7 +104,7 @@ class Adapted:
     ScenarioError
         The run ends at t = 0: nothing was played.
     ArithmeticError
-        The Riccati equation cannot be followed inside a step from the values given.
+        The Riccati equation cannot be followed inside a step from the values given, or a step is too stiff for it.
     """
 
     def __init__(self, run: Run, equilibrium: FeedbackSolution | None = None) -> None:
@@ -119,8 +119,10 @@ class Adapted:
         self.gains = run.gains[: self.length]
         self.start = run.position[0, :-1] - run.position[0, -1]
         # a stiff step is cut into pieces, each with its own nodes
-        speed = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max())
-        self.pieces = int(np.clip(np.ceil(8.0 * speed * sc.horizon / sc.steps), 1, _PIECES))
+        stiff = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max()) * sc.horizon / sc.steps
+        if not stiff <= _PIECES:  # no piece would be short enough: say so before computing any
+            raise ArithmeticError(f"‖C‖δ = {stiff:.2g} where {_PIECES} pieces of a step can follow {_PIECES}")
+        self.pieces = int(np.clip(np.ceil(8.0 * stiff), 1, _PIECES))
         self.step = sc.horizon / sc.steps / self.pieces
         self.steps = self.length * self.pieces
         self.inside = self._values_inside()
@@ -131,7 +133,9 @@ class Adapted:
         for _ in range(self.pieces):
             inside = riccati_within(self.m, right, self.step)
             if inside is None:
-                raise ArithmeticError("the Riccati equation escapes inside a step: the values given do not solve it")
+                raise ArithmeticError(
+                    "the Riccati equation cannot be followed inside a step: too stiff, or it escapes from P given"
+                )
             found.append(inside[0])
             right = inside[1]
         by_piece = np.stack(found[::-1], axis=2)
@@ -238,7 +242,9 @@ class Adapted:
             first = 0.5 * float(np.sum(ends[0] * (value_of[p][0] @ ends[0])))
             scale = abs(last) + abs(first) + 0.5 * integral(np.abs(twice), self.step)
             value = last + 0.5 * integral(twice, self.step)
-            found.append(Index(name, value, first, 0.5 * integral(right, self.step), scale, resolved))
+            deviated = 0.5 * integral(right, self.step)
+            finite = bool(np.isfinite([value, first, deviated, scale]).all())  # what overflows decides nothing
+            found.append(Index(name, value, first, deviated, scale, resolved and finite))
         return tuple(found)
 
     def party_of(self, player: int) -> tuple[int, float]:

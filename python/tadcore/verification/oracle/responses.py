@@ -93,8 +93,12 @@ def best_responses(sc: Scenario, feedback: Floats) -> tuple[BestResponse, ...]:
     z = sc.positions[:-1] - sc.positions[-1]
     found = []
     for p in range(len(m.parties)):
-        tight, loose = (_respond(sc, m, p, spline, z, rtol) for rtol in (_RTOL, 100.0 * _RTOL))
-        found.append(replace(tight, converged=tight.converged and loose.converged and smooth and _agree(tight, loose)))
+        tight = _respond(sc, m, p, spline, z, _RTOL)
+        decided = smooth and tight.converged
+        if decided:
+            loose = _respond(sc, m, p, spline, z, 100.0 * _RTOL)
+            decided = loose.converged and _agree(tight, loose)
+        found.append(replace(tight, converged=decided))
     return tuple(found)
 
 
