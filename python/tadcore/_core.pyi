@@ -5,7 +5,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "simd"]
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "grid_times", "simd"]
 
 __version__: str
 
@@ -14,6 +14,9 @@ def simd() -> Literal["baseline", "avx2", "avx512"]:
 
     TadcoreError where TADCORE_SIMD names none, or some that this processor does not have.
     """
+
+def grid_times(horizon: float, step: float) -> NDArray[np.float64]:
+    """t_0 … t_K, the doubles nearest to k T / K; ScenarioError for a step that does not divide the horizon."""
 
 @final
 class Game:

@@ -151,5 +151,5 @@ class Explorer:
     def coarse_step(self) -> float:
         """The step of previews: a few steps of the scenario, as long as they divide the horizon."""
         sc = self.scenario
-        steps = round(sc.horizon / sc.step)
-        return sc.step * next(many for many in (*_COARSE, 1) if steps % many == 0)
+        many = next((many for many in _COARSE if sc.steps % many == 0), 1)
+        return sc.horizon / (sc.steps // many) if many > 1 else sc.step

@@ -2,8 +2,8 @@ r"""When games end, and how: cumulative incidence of each outcome.
 
 The cumulative incidence of outcome j is :math:`F_j(t) = P(\text{the game has ended by } t, \text{ in outcome } j)`.
 Every trial is followed to its end or to T, so nothing is censored and the share of trials that ended so by t is the
-estimate, no product-limit formula needed. Trials end on the grid t_k = kδ, so most share their instant with others:
-ends are counted by k, and ties cost nothing.
+estimate, no product-limit formula needed. Trials end on the grid t_k = k T / K, so most share their instant with
+others: ends are counted by k, and ties cost nothing.
 
 **Bands.** Put T_j = t where a trial ended in outcome j, T_j = ∞ elsewhere: F_j is the distribution function of T_j, and
 its estimate the empirical one. For a continuous law, :math:`\sup_t |\hat F - F|` has the Kolmogorov distribution, whose
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tadcore import _core
 from tadcore._shared.arrays import Floats, as_real, refuse_where
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
@@ -40,7 +41,7 @@ class Incidence:
     Attributes
     ----------
     times : ndarray, shape (K + 1,)
-        The grid t_k = kδ.
+        The grid t_k = k T / K.
     names : tuple of str
         ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
     estimate, low, high : ndarray, shape (3 + n, K + 1)
@@ -136,8 +137,9 @@ def incidence(
 
     codes, who = as_outcomes(kind, defender, n)
     confidence = as_level(level)
-    steps = _steps_of(horizon, step)
-    at = _instants(time, len(codes), step, steps)
+    times = _grid(horizon, step)
+    steps = len(times) - 1
+    at = _instants(time, len(codes), horizon, steps)
     names = outcome_names(n)
     ended = np.zeros((len(names), steps + 1), dtype=np.int64)
     np.add.at(ended, (codes, at), 1)
@@ -147,7 +149,7 @@ def incidence(
     error = (1.0 - confidence) / (len(names) if jointly else 1)
     half = float(kstwo.isf(error, len(codes)))
     return Incidence(
-        times=np.linspace(0.0, horizon, steps + 1),
+        times=times,
         names=names,
         estimate=estimate,
         low=np.maximum(estimate - half, 0.0),
@@ -159,24 +161,23 @@ def incidence(
     )
 
 
-def _steps_of(horizon: float, step: float) -> int:
-    ratio = horizon / step if step > 0.0 else np.nan
-    if not (np.isfinite(ratio) and ratio > 0.5 and abs(ratio - round(ratio)) <= _OFF_GRID * ratio):
+def _grid(horizon: float, step: float) -> Floats:
+    """The instants of the game itself; T over the whole number of steps, as δ may differ from it in the last digits."""
+    if not (step > 0.0 and horizon > 0.0 and np.isfinite(horizon / step)):
         raise ScenarioError("step", step, f"a positive divisor of the horizon ({horizon!r})")
-    return round(ratio)
+    return _core.grid_times(horizon, step)
 
 
-def _instants(time: ArrayLike, trials: int, step: float, steps: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _instants(time: ArrayLike, trials: int, horizon: float, steps: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """The number k of each instant t_k."""
     times = as_real("time", time, "an array of instants")
     if times.shape != (trials,):
         raise ScenarioError("time", f"shape {times.shape}", f"of shape ({trials},), one instant for each trial")
-    count = times / step
+    count = times / horizon * steps
     with np.errstate(invalid="ignore"):
-        good = np.abs(count - np.rint(count)) <= _OFF_GRID
+        good = np.abs(count - np.rint(count)) <= max(_OFF_GRID, 1e-15 * steps)
         good &= (count > -0.5) & (count < steps + 0.5)
-    refuse_where(
-        "time", times, ~good, f"a multiple of the step ({step!r}) between 0 and the horizon ({steps * step:.6g})"
-    )
+    rule = f"a multiple of the step ({horizon / steps!r}) between 0 and the horizon ({horizon!r})"
+    refuse_where("time", times, ~good, rule)
     whole: np.ndarray[tuple[int], np.dtype[np.int64]] = np.rint(count).astype(np.int64)
     return whole

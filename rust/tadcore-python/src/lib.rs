@@ -10,7 +10,9 @@ mod gains;
 mod game;
 mod record;
 
+use numpy::PyArray1;
 use pyo3::prelude::*;
+use tadcore::game::Grid;
 
 /// The compiled core of tadcore.
 #[pymodule]
@@ -29,6 +31,13 @@ mod _core {
     #[pyfunction]
     fn simd(py: Python<'_>) -> PyResult<&'static str> {
         tadcore::simd::in_use().map_err(|error| errors::simd(py, &error))
+    }
+
+    /// t_0 … t_K of the grid with step δ on [0, T].
+    #[pyfunction]
+    fn grid_times<'py>(py: Python<'py>, horizon: f64, step: f64) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let grid = Grid::new(horizon, step).map_err(|error| errors::game(py, error))?;
+        Ok(PyArray1::from_iter(py, (0..=grid.steps()).map(|k| grid.time(k))))
     }
 
     #[pymodule_init]

@@ -1,6 +1,7 @@
 """Weights and matrices of the game (section 2 of the paper), and the eight runs of its section 6."""
 
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -48,7 +49,7 @@ class Game:
 
     @property
     def times(self):
-        return np.arange(self.steps + 1) * self.step
+        return np.array([float(Fraction(self.horizon) * k / self.steps) for k in range(self.steps + 1)])
 
     @property
     def gammas(self):

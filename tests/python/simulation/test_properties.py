@@ -1,12 +1,15 @@
 """What holds for every valid scenario, found by Hypothesis; the theorems themselves are in test_oracle_theorems."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
-from hypothesis import given, strategies as st
+import pytest
+from hypothesis import given, settings, strategies as st
 
 import tadcore
-from tadcore import Scenario, TadcoreError
+from tadcore import NoEquilibriumError, Outcome, Scenario, TadcoreError
+from tadcore.statistics import incidence
 from tadcore.study.manifest import Manifest
 
 PLAIN, NEAR, SMALL = st.floats(0.3, 3.0), st.floats(-3.0, 3.0), st.floats(0.05, 0.4)
@@ -16,7 +19,18 @@ ANY_COORDINATE = st.floats(-1e100, 1e100)
 
 
 @st.composite
-def scenarios(draw, most=4, weight=PLAIN, coordinate=NEAR, radius=SMALL, steps=10):
+def grids(draw, longest=0.5):
+    """T and δ, in decimal as people write them or as a division leaves them."""
+    count = draw(st.integers(1, 100))
+    if draw(st.booleans()):
+        step = draw(st.integers(1, max(int(1e4 * longest / count), 1))) / 1e4
+        return float(f"{count * step:.4f}"), step
+    horizon = draw(st.floats(0.01, longest))
+    return horizon, horizon / count * (1.0 + draw(st.floats(-9e-10, 9e-10)))
+
+
+@st.composite
+def scenarios(draw, most=4, weight=PLAIN, coordinate=NEAR, radius=SMALL):
     """A valid scenario of either interaction, in the plane or in space, with or without its optional fields."""
     interaction, axes = draw(st.sampled_from(["I1", "I2"])), draw(st.sampled_from([2, 3]))
 
@@ -26,11 +40,10 @@ def scenarios(draw, most=4, weight=PLAIN, coordinate=NEAR, radius=SMALL, steps=1
         return table | {name: draw(radius) for name in needed}
 
     own = ["running_weight", "terminal_weight"] if interaction == "I1" else []
-    count = draw(st.integers(1, steps))
-    step = draw(st.floats(0.01, 0.05))
+    horizon, step = draw(grids())
     data = {
         "interaction": interaction,
-        "horizon": count * step,
+        "horizon": horizon,
         "step": step,
         "attacker": part(["capture_radius"], ["target_running_weight", "target_terminal_weight"]),
         "target": part([], own),
@@ -93,6 +106,40 @@ def test_a_batch_is_its_single_runs_whatever_varies(sc, seed, threads):
         changes |= {f"defenders[{j}].capture_radius": capture[i, j] for j in range(sc.n)}
         changes["attacker.capture_radius"] = capture[i, -1]
         assert tadcore.simulate(sc.replace(changes)).outcome == batch[i]
+
+
+@settings(max_examples=300)
+@given(scenarios(most=2))
+def test_instants_are_those_of_exact_arithmetic(sc):
+    """t_k is the double nearest to k T / K in whatever shows a time, and every accepted grid is solved or escapes."""
+    grid = np.array([float(Fraction(sc.horizon) * k / sc.steps) for k in range(sc.steps + 1)])
+    assert (grid[0], grid[-1]) == (0.0, sc.horizon)
+    try:
+        equilibrium = tadcore.solve_equilibrium(sc)
+    except NoEquilibriumError:
+        return
+    assert np.array_equal(equilibrium.times, grid)
+    run = tadcore.simulate(sc)
+    last = len(run.times) - 1
+    assert np.array_equal(run.times, grid[: last + 1])
+    assert np.array_equal(run.dataset.time, run.times)
+    assert run.outcome.time == grid[last]
+    assert {change.time for change in run.network_changes} <= set(grid)
+    assert run.intervals()[-1].end == run.outcome.time if run.network_changes else last == 0
+    batch = tadcore.simulate_batch(sc, [sc.positions])
+    assert batch.time[0] == grid[last]
+    found = incidence(batch.kind, batch.defender, batch.time, horizon=sc.horizon, step=sc.step, n=sc.n)
+    assert np.array_equal(found.times, grid)
+    assert found.running[last] == 0.0
+    assert (found.running[:last] == 1.0).all()
+
+
+@pytest.mark.parametrize(("horizon", "step"), [(0.99, 0.01), (1.3, 0.1), (5.2, 0.1), (0.42, 0.005), (0.29, 0.01)])
+def test_horizons_that_a_rounded_division_misses(horizon, step):
+    sc = tadcore.scenarios.load("paper-i1").replace({"horizon": horizon, "step": step})
+    assert tadcore.solve_equilibrium(sc).times[-1] == horizon
+    far = sc.replace({"attacker.position": [-50.0, 0.0]})
+    assert tadcore.simulate(far).outcome == Outcome("timeout", None, horizon)
 
 
 @given(scenarios())

@@ -6,6 +6,7 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.simulation.run import Run, simulate
+from tadcore.verification.checks.steps import refined
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution
@@ -111,10 +112,8 @@ def gap_order(run: Run, *, halvings: int = 3) -> dict[str, tuple[Floats, Floats]
     dict of str to (ndarray, ndarray)
         By index the gaps, shape (halvings + 1,), and the observed orders log₂(gap(δ) / gap(δ/2)), shape (halvings,).
     """
-    gaps = [sampling_gap(Adapted(run))]
-    for half in range(1, halvings + 1):
-        finer = run.scenario.replace(step=run.scenario.step / 2**half)
-        gaps.append(sampling_gap(Adapted(simulate(finer))))
+    finer = refined(run.scenario, halvings)[1:]
+    gaps = [sampling_gap(Adapted(played)) for played in (run, *map(simulate, finer))]
     series = {party: np.array([gap[party] for gap in gaps]) for party in gaps[0]}
     with np.errstate(divide="ignore", invalid="ignore"):
         return {party: (gap, np.log2(np.abs(gap[:-1] / gap[1:]))) for party, gap in series.items()}

@@ -86,7 +86,7 @@ class Refinement:
 def refined(sc: Scenario, halvings: int, *, least: int = 0) -> list[Scenario]:
     """The scenario at δ, δ/2, δ/4, …: ``halvings`` + 1 of them."""
     count = as_index("halvings", halvings, 20, least=least)
-    return [sc.replace(step=sc.step / 2**i) for i in range(count + 1)]
+    return [sc, *(sc.replace(step=sc.horizon / (sc.steps * 2**i)) for i in range(1, count + 1))]
 
 
 def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:

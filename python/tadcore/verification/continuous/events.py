@@ -21,6 +21,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import brentq
 
+from tadcore import _core
 from tadcore._shared.arrays import Floats
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
@@ -78,6 +79,7 @@ class _Play:
     def run(self) -> EventPlay:
         """From t = 0 to the end."""
         sc, step = self.sc, self.sc.horizon / self.sc.steps
+        times = _core.grid_times(sc.horizon, sc.step).tolist()
         values = self.circles.values(self.z)[self.first :]
         if (values <= 0).any():
             return self._end(0.0, int(np.argmin(np.where(values <= 0, np.linalg.norm(self.z, axis=1), np.inf))))
@@ -88,13 +90,13 @@ class _Play:
                 done += s
                 if circle is None:
                     break
-                time = k * step + done
+                time = min(times[k] + done, times[k + 1])
                 if circle >= self.first:
                     return self._end(time, circle - self.first)
                 if not self._switch(k, circle, time):
                     return self._stop(time)
             else:
-                return self._stop(k * step + done)
+                return self._stop(time)
         return self._end(sc.horizon, None)
 
     def _end(self, time: float, who: int | None) -> EventPlay:

@@ -150,7 +150,8 @@ pub(super) fn integrate(
     sink: &mut dyn FnMut(usize, &[f64]),
 ) -> Result<usize, EquilibriumError> {
     let mut w = Workspace::new(y0, flow.block_len());
-    let node = |j: usize| j as f64 * horizon / steps as f64;
+    // The last node is the horizon itself, however the quotient rounds: it is delivered by the step that ends there.
+    let node = |j: usize| if j < steps { j as f64 * horizon / steps as f64 } else { horizon };
     sink(0, y0);
     flow.derivative(y0, &mut w.k[..y0.len()]);
     let mut h = w.first_step(horizon);
