@@ -7,6 +7,7 @@ use libfuzzer_sys::fuzz_target;
 use tadcore::cancel::CancelToken;
 use tadcore::cost::costs;
 use tadcore::ensemble::{self, Batch};
+use tadcore::error::{EquilibriumError, RunError};
 use tadcore::game::{Game, Grid, Interaction, Weights};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{Outcome, Setup, simulate};
@@ -56,7 +57,7 @@ impl Number {
 fuzz_target!(|input: Input| {
     let n = 1 + usize::from(input.defenders % 5);
     let dim = 1 + usize::from(input.axes % 3);
-    let steps = 1 + usize::from(input.steps % 24);
+    let steps = 1 + usize::from(input.steps % 120);
     let interaction = if input.first { Interaction::I1 } else { Interaction::I2 };
     let part = |i: usize| -> Vec<f64> { (0..n).map(|k| input.weights[(5 * i + k) % 24].positive()).collect() };
     let own = |i: usize| if input.first { part(i) } else { Vec::new() };
@@ -81,7 +82,13 @@ fuzz_target!(|input: Input| {
         return;
     };
     let cancel = CancelToken::new();
-    let Ok(policy) = Policy::new(game, DEFAULT_TABLE_BYTES, &cancel) else { return };
+    let policy = match Policy::new(game, DEFAULT_TABLE_BYTES, &cancel) {
+        Ok(policy) => policy,
+        Err(EquilibriumError::StepBudget { reached, horizon, .. }) => {
+            return assert!(reached < horizon, "all of the way was covered, and no equilibrium is given");
+        }
+        Err(_) => return,
+    };
     assert!(policy.equilibrium().as_slice().iter().all(|p| p.is_finite()), "P is not finite");
     let (m, last) = (policy.game().constrained(), policy.game().grid().steps());
     let positions: Vec<f64> = (0..(n + 2) * dim).map(|e| input.places[e % 24].signed()).collect();
@@ -99,7 +106,10 @@ fuzz_target!(|input: Input| {
         assert!(values.iter().all(|x| x.is_finite()), "a number of the run is not finite");
     }
     assert!(record.theta.iter().all(|&theta| theta >= 0.0), "Θ is negative");
-    assert!(costs(&policy, &record).iter().all(|j| j.is_finite()), "a cost is not finite");
+    match costs(&policy, &record) {
+        Ok(costs) => assert!(costs.iter().all(|j| j.is_finite()), "a cost is not finite"),
+        Err(error) => assert!(matches!(error, RunError::Cost { .. }), "{error}"),
+    }
     assert!(record.steps <= last, "the run is longer than the game");
     if let Outcome::Intercepted(i) = record.outcome {
         assert!(i < n, "there is no such defender");

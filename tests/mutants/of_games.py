@@ -72,8 +72,16 @@ MUTANTS = {
         ("J: terminal weight", "«*j += 0.5 * weighted(&f, &z, dim);»", "*j -= 0.5 * weighted(&f, &z, dim);"),
         ("J of I1: own effort", "«weighted(q, z, dim) + own»", "weighted(q, z, dim) - own"),
         ("J of I2: efforts", "«attacker - team - target»", "attacker - team + target"),
+        ("J: cost of a stiff step", "«*j += 0.5 * quadratic(w, &z, dim)»", "*j -= 0.5 * quadratic(w, &z, dim)"),
+        ("J: form of an effort", "*x «+=» r * row[ij / size]", "-="),
+        ("J: form of I2", "team(-1.0).chain([(n, «-w.r_tau»)", "w.r_tau"),
         ("J: expansion of z", "«*x *= h / j as f64»", "*x *= -h / j as f64"),
         ("J: Horner", "«*v = *v * s + t»", "*v = *v * s - t"),
+    ],
+    "cost/gramian.rs": [
+        ("Gramian: doubling", "w.iter_mut().zip(&next).for_each(|(w, x)| «*w += x»);", "*w -= x"),
+        ("Gramian: series", "w.iter_mut().zip(&term).for_each(|(w, x)| «*w += x»);", "*w -= x"),
+        ("Gramian: CᵀT + TC", "half[ij] «+» half[ij % n * n + ij / n]", "-"),
     ],
     "ensemble/chunk.rs": [
         ("batches: z = X − X_a", "«x - attacker[e % dim]»", "x + attacker[e % dim]"),

@@ -97,7 +97,9 @@ fn costs_are_the_value_functions_when_everyone_sees_everyone() {
         assert_eq!(record.outcome, Outcome::Timeout);
         let mut z = Vec::new();
         tadcore::simulation::relative_state(&start.positions.concat(), 2, &mut z);
-        for (j, p) in cost::costs(&policy, &record).into_iter().zip(policy.equilibrium().node(0).chunks_exact(9)) {
+        for (j, p) in
+            cost::costs(&policy, &record).expect("costs").into_iter().zip(policy.equilibrium().node(0).chunks_exact(9))
+        {
             let value: f64 =
                 (0..9).map(|e| p[e] * (0..2).map(|x| z[e / 3 * 2 + x] * z[e % 3 * 2 + x]).sum::<f64>()).sum();
             // The sampled feedback is held over a step, so J differs from the value by O(δ).
@@ -278,7 +280,8 @@ fn costs_are_the_integrals_over_the_recorded_states() {
     {
         let policy = paper(interaction, 1.0);
         let record = run(&policy, &start);
-        let (computed, expected) = (cost::costs(&policy, &record), costs_by_trapezoids(&policy, &record));
+        let (computed, expected) =
+            (cost::costs(&policy, &record).expect("costs"), costs_by_trapezoids(&policy, &record));
         assert_eq!(computed.len(), expected.len());
         for (a, b) in computed.iter().zip(&expected) {
             assert!((a - b).abs() < 1e-8 * b.abs().max(1.0), "{interaction:?}: {a} and {b}");

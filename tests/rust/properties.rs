@@ -87,7 +87,7 @@ proptest! {
         for values in [&record.positions, &record.controls, &record.gains, &record.theta, &record.terms] {
             prop_assert!(values.iter().all(|x| x.is_finite()));
         }
-        prop_assert!(costs(&policy, &record).iter().all(|j| j.is_finite()));
+        prop_assert!(costs(&policy, &record).expect("costs").iter().all(|j| j.is_finite()));
         prop_assert!(record.theta.iter().all(|&theta| theta >= 0.0));
     }
 

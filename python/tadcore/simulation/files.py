@@ -156,4 +156,4 @@ def save(run: Written, folder: str | os.PathLike[str]) -> None:
     packed = run.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")
     write_whole(place / "run.nc", bytes(packed))
     run.scenario.to_toml(place / "scenario.toml")
-    write_whole(place / "summary.json", json.dumps(summary_of(run), indent=2) + "\n")
+    write_whole(place / "summary.json", json.dumps(summary_of(run), indent=2, allow_nan=False) + "\n")

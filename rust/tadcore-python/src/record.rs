@@ -9,7 +9,7 @@ use tadcore::policy::Policy;
 use tadcore::simulation::Record as CoreRecord;
 
 use super::arrays::shaped;
-use super::detach;
+use super::{detach, errors};
 
 /// One recorded run of L steps: rows 0…L, the last the terminal state.
 #[pyclass(frozen, module = "tadcore._core")]
@@ -101,7 +101,8 @@ impl Record {
     /// J of each player: J_d, J_τ, J_a in I1, J in I2.
     #[getter]
     fn costs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let costs = detach::interruptible(py, |_| cost::costs(&self.policy, &self.record))?;
+        let costs = detach::interruptible(py, |_| cost::costs(&self.policy, &self.record))?
+            .map_err(|error| errors::run(py, self.policy.game(), error))?;
         Ok(PyArray1::from_vec(py, costs))
     }
 

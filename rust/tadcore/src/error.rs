@@ -138,6 +138,12 @@ pub enum RunError {
         /// The instant at which it was noticed.
         time: f64,
     },
+    /// A cost left the range of double precision.
+    #[error("a cost of the run up to t = {time} lies beyond the range of double precision")]
+    Cost {
+        /// The time of the end.
+        time: f64,
+    },
     /// The system gave no threads.
     #[error("threads is {0}, but the system would not start that many")]
     Threads(usize),

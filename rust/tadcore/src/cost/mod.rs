@@ -2,10 +2,14 @@
 //!
 //! J = ½‖z(t_end)‖²_F + ½∫(‖z‖²_Q ± ‖u‖²_R)dt with the terminal weight at the time of termination. Between instants
 //! z(t_k + s) = exp(Cs)z(t_k) is expanded in its Taylor series, so the integrand is a polynomial to rounding and
-//! Gauss–Legendre quadrature of matching order integrates it exactly; a stiff step is cut into pieces first.
+//! Gauss–Legendre quadrature of matching order integrates it exactly; a step with ‖C‖δ > ½ is cut into pieces first.
+//! Where that would take more than some pieces, ½ z(t_k)ᵀ W z(t_k) takes their place, W the [`gramian`] of the step.
 //!
 //! Costs carry all axes: they are the paper's own J, not a reduced factor.
 
+mod gramian;
+
+use crate::error::RunError;
 use crate::game::Interaction;
 use crate::policy::{Policy, closed_loop};
 use crate::simulation::{Record, apply};
@@ -23,13 +27,15 @@ const GAUSS: [(f64, f64); 8] = [
 ];
 /// Degree of the expansion of z over a piece with ‖C‖h ≤ ½.
 const DEGREE: usize = 16;
-/// Pieces of one step.
-const PIECES: usize = 1 << 12;
+/// Pieces of one step at most; a step that needs more is stiff.
+const PIECES: f64 = 32.0;
 
 /// J of each player along `record`: J_d, J_τ, J_a in I1, the one J in I2 (minimised by the attacker, maximised by the
 /// team).
-#[must_use]
-pub fn costs(policy: &Policy, record: &Record) -> Vec<f64> {
+///
+/// # Errors
+/// [`RunError::Cost`] where one lies beyond the range of double precision.
+pub fn costs(policy: &Policy, record: &Record) -> Result<Vec<f64>, RunError> {
     let game = policy.game();
     let (size, dim, m) = (game.size(), record.dim, game.constrained());
     let step = game.grid().step();
@@ -44,10 +50,16 @@ pub fn costs(policy: &Policy, record: &Record) -> Vec<f64> {
         rows.extend(free.target.iter().flatten());
         rows.extend_from_slice(&free.attacker);
         let norm = c.chunks_exact(size).map(|r| r.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max) * step;
-        let pieces = ((2.0 * norm).ceil().max(1.0) as usize).min(PIECES);
-        let h = step / pieces as f64;
+        let pieces = (2.0 * norm).ceil().max(1.0);
         let mut z = relative(record, k, size, dim);
-        for _ in 0..pieces {
+        if pieces > PIECES {
+            let mut forms = forms(policy, &running, &rows);
+            gramian::gramians(&c, size, step, &mut forms);
+            total.iter_mut().zip(&forms).for_each(|(j, w)| *j += 0.5 * quadratic(w, &z, dim));
+            continue;
+        }
+        let h = step / pieces;
+        for _ in 0..pieces as usize {
             let series = expansion(&c, &z, size, dim, h);
             for (s, weight) in GAUSS {
                 let at = evaluate(&series, s);
@@ -62,7 +74,8 @@ pub fn costs(policy: &Policy, record: &Record) -> Vec<f64> {
     for (j, f) in total.iter_mut().zip(game.state_weights(true)) {
         *j += 0.5 * weighted(&f, &z, dim);
     }
-    total
+    let finite = total.iter().all(|j| j.is_finite());
+    if finite { Ok(total) } else { Err(RunError::Cost { time: game.grid().time(record.steps) }) }
 }
 
 /// z of row k of a record.
@@ -97,6 +110,38 @@ fn integrands(policy: &Policy, running: &[Vec<f64>], rows: &[f64], z: &[f64], di
         Interaction::I2 => vec![attacker - team - target],
     };
     running.iter().zip(own).map(|(q, own)| weighted(q, z, dim) + own).collect()
+}
+
+/// The same as quadratic forms: of each objective the M with zᵀ M z twice the integrand at z.
+fn forms(policy: &Policy, running: &[Vec<f64>], rows: &[f64]) -> Vec<Vec<f64>> {
+    let game = policy.game();
+    let (n, size, w) = (game.n(), game.size(), game.weights());
+    let team = |sign: f64| w.r_d.iter().map(move |r| sign * r).enumerate();
+    let own: Vec<Vec<(usize, f64)>> = match game.interaction() {
+        Interaction::I1 => vec![team(1.0).collect(), vec![(n, w.r_tau)], vec![(n + 1, w.r_a)]],
+        Interaction::I2 => vec![team(-1.0).chain([(n, -w.r_tau), (n + 1, w.r_a)]).collect()],
+    };
+    let form = |(efforts, q): (&Vec<(usize, f64)>, &Vec<f64>)| {
+        let mut m = vec![0.0; size * size];
+        for (player, r) in efforts {
+            let row = &rows[player * size..(player + 1) * size];
+            m.iter_mut().enumerate().for_each(|(ij, x)| *x += r * row[ij / size] * row[ij % size]);
+        }
+        q.iter().enumerate().for_each(|(i, q)| m[i * size + i] += q);
+        m
+    };
+    own.iter().zip(running).map(form).collect()
+}
+
+/// zᵀ W z, summed over the axes.
+fn quadratic(w: &[f64], z: &[f64], dim: usize) -> f64 {
+    let mut product = vec![0.0; dim];
+    let rows = w.chunks_exact(z.len() / dim).zip(z.chunks_exact(dim));
+    rows.map(|(row, own)| {
+        apply(row, z, dim, &mut product);
+        own.iter().zip(&product).map(|(x, y)| x * y).sum::<f64>()
+    })
+    .sum()
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -103,7 +103,8 @@ fn large(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64]) {
     e.copy_from_slice(&sum);
 }
 
-fn multiply(out: &mut [f64], a: &[f64], b: &[f64], n: usize) {
+/// out = a b, N × N.
+pub(crate) fn multiply(out: &mut [f64], a: &[f64], b: &[f64], n: usize) {
     matmul(
         MatMut::from_row_major_slice_mut(out, n, n),
         Accum::Replace,
