@@ -45,7 +45,8 @@ def sensitivity(
     level : float
         Confidence level of each interval.
     resamples : int
-        Bootstrap resamples.
+        Bootstrap resamples. With fewer than 2 / (1 - level) - 1 there are no such percentiles, and every interval is
+        [0, 1].
     threads : int, optional
         Worker threads; all cores by default.
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 
 from .options import Changes, Source, read
@@ -48,7 +49,7 @@ def draw_map(
     total = found.dataset["kind"].size
     say(f"{total:,} places for the start of {player}")
     for name, count in found.counts().items():
-        say(f"{name:<12} {count:>12,}  {count / total:.4f}", indent=2)
+        say(f"{name:<12} {count:>12,}  {share(count / total)}", indent=2)
     say(f"written to {out}")
 
 
@@ -56,7 +57,10 @@ def write_report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="The store of a study.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("report.html"),
     title: Annotated[str, typer.Option(metavar="TEXT", help="What to call the study.")] = "",
-    level: Annotated[float, typer.Option(metavar="SHARE", help="Confidence level of intervals and bands.")] = 0.95,
+    level: Annotated[
+        float | None,
+        typer.Option(metavar="SHARE", help="Confidence level of intervals and bands; 0.95, or the stopping rule's."),
+    ] = None,
 ) -> None:
     """Write a study as one HTML page: tables, figures and provenance.
 

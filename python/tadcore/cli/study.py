@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from tadcore._shared.shares import percent
+
 from .terminal import complain, say
 
 _INTERRUPTED = 130
@@ -44,6 +46,7 @@ def study(
 
     Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
     """
+    from tadcore.game.outcome import OutcomeKind
     from tadcore.study.manifest import Manifest
     from tadcore.study.study import Study
 
@@ -55,7 +58,9 @@ def study(
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None
+    found = result.probabilities()
     say(f"{result.trials:,} trials")
-    for name, count in result.counts().items():
-        say(f"{name:<12} {count:>12,}  {count / result.trials:.4f}", indent=2)
+    for name, count, share, interval in found.rows()[: len(OutcomeKind)]:
+        say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
+    say(f"intervals: {percent(found.level)} ({found.method})", indent=2)
     say(f"written to {store}")

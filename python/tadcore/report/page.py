@@ -13,7 +13,7 @@ from .parts import Reported
 from .sections import examples, inputs, notes, origin, outcomes, times
 
 
-def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float = 0.95) -> Path:
+def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float | None = None) -> Path:
     """Write a study as an HTML page.
 
     Parameters
@@ -24,8 +24,8 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
         The file to write, whole or not at all; folders on the way are made.
     title : str
         What to call the study.
-    level : float
-        Confidence level of intervals and bands.
+    level : float, optional
+        Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop.
 
     Returns
     -------

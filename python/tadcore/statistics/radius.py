@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, Integers
+from tadcore._shared.shares import estimate, percent
 
 from .comparison import difference_interval
 
@@ -66,21 +67,25 @@ class RadiusCurve:
     names : tuple of str
         ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
     estimate, low, high : ndarray, shape (3 + n, R)
-        Probabilities with pointwise intervals.
+        Probabilities with pointwise intervals: Wilson's, or a confidence sequence's where a rule was asked when to
+        stop.
     band_low, band_high : ndarray, shape (3 + n, R)
-        The band that holds at all radii at once.
+        The band of one outcome that holds at all R radii at once: Clopper and Pearson's intervals, or the confidence
+        sequence's, each with 1 / R of 1 - level.
     reference : float
         The radius that differences are taken against; the scenario's own unless another was given.
     difference, difference_low, difference_high : ndarray, shape (3 + n, R)
-        P(r) - P(reference), paired.
+        P(r) - P(reference), paired, each interval by itself.
     slope, slope_low, slope_high : ndarray, shape (3 + n, R - 1)
-        The gain per unit of radius between neighbouring radii, paired.
+        The gain per unit of radius between neighbouring radii, paired, each interval by itself; 0 up to inf.
     kind, defender : ndarray of int8 and int32, shape (R, M)
         Every outcome, as in `tadcore.Batch`.
     level : float
         Confidence level.
     breakpoints : Breakpoints or None
         The radii at which single trials change, where asked for.
+    rule : str
+        The rule that was asked when to stop the study; empty where the number of trials was fixed beforehand.
     """
 
     player: str
@@ -103,6 +108,7 @@ class RadiusCurve:
     defender: NDArray[np.int32]
     level: float
     breakpoints: Breakpoints | None
+    rule: str = ""
 
     @property
     def trials(self) -> int:
@@ -130,20 +136,28 @@ class RadiusCurve:
                 "reference": self.reference,
                 "trials": self.trials,
                 "level": self.level,
+                **({"rule": self.rule} if self.rule else {}),
             },
         )
 
     def __repr__(self) -> str:
         i = self.names.index("intercepted")
-        low, high = self.estimate[i].min(), self.estimate[i].max()
+        ends = [int(np.argmin(self.estimate[i])), int(np.argmax(self.estimate[i]))]
+        least, most = (" ".join(estimate(self.estimate[i, r], self.low[i, r], self.high[i, r])) for r in ends)
+        by = f"; {self.rule}" if self.rule else ""
         return (
             f"RadiusCurve({self.radius} of {self.player} at {len(self.radii)} radii in [{self.radii[0]:g}, "
-            f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {low:.4f} to {high:.4f})"
+            f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {least} to {most}, "
+            f"{percent(self.level)}{by})"
         )
 
 
-def paired_differences(pairs: list[tuple[Integers, Integers]], trials: int, level: float) -> Floats:
+def paired_differences(
+    pairs: list[tuple[Integers, Integers]], trials: int, level: float, method: Literal["score", "sequence"]
+) -> Floats:
     """Difference, low and high, shape (3, outcomes, R), from what is discordant at each of R radii."""
     counts = np.array(pairs)  # (R, 2, outcomes)
     first, second = counts[:, 0].T, counts[:, 1].T
-    return np.array([(first - second) / trials, *difference_interval(first, second, trials, level=level)])
+    return np.array(
+        [(first - second) / trials, *difference_interval(first, second, trials, level=level, method=method)]
+    )
