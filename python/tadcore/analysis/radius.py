@@ -31,7 +31,7 @@ from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
-from tadcore.statistics.intervals import ends
+from tadcore.statistics.intervals import band, ends
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
 from tadcore.statistics.stopping import level_of, stopping_of
@@ -121,9 +121,7 @@ def radius_curve(
     count = np.array(counts).T
     error, trials = 1.0 - confidence, len(rows)
     low, high = ends(count, trials, error, "wilson" if stopping is None else "sequence")
-    together = 1.0 - error / len(grid)
-    shared = 1.0 - together if together < 1.0 else error / len(grid)  # bitwise that of an interval at this level
-    band_low, band_high = ends(count, trials, shared, "exact" if stopping is None else "sequence")
+    band_low, band_high = band(count, trials, error, len(grid), "exact" if stopping is None else "sequence")
     by: Literal["score", "sequence"] = "score" if stopping is None else "sequence"
     difference = paired_differences(against_reference, trials, confidence, by)
     slope = paired_differences(against_last, trials, confidence, by)[..., 1:] / np.diff(grid)

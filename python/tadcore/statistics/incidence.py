@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _OFF_GRID = 1e-6  # steps
-_RAREST = 1e-9  # below this the quantiles of SciPy are too small: at 1e-16 the law exceeds them five times as often
+_RAREST = 1e-5  # below this the quantiles of SciPy are too small: at 1e-16 the law exceeds them five times as often
 _MOST_ENTRIES = 2**28  # of a curve for every outcome: 2 GiB each of the estimate and of both ends of its band
 
 

@@ -230,6 +230,13 @@ def ends(count: Integers, trials: int, error: float, method: Method) -> tuple[Fl
     return low, np.where(s == 0.0, z * z / (trials + z * z), high)  # where 1 - 1 would be all that is left
 
 
+def band(count: Integers, trials: int, error: float, many: int, method: Method) -> tuple[Floats, Floats]:
+    """Intervals of which ``many`` hold together: each has its share of the error (Bonferroni), whatever they share."""
+    together = 1.0 - error / many
+    # bitwise that of `proportion_interval` at this level, where there is such a level in double precision
+    return ends(count, trials, 1.0 - together if together < 1.0 else error / many, method)
+
+
 def _score_low(s: Floats, trials: int, z: float) -> Floats:
     """The smaller root of (s/M - p)² = z² p (1 - p) / M, its numerator made rational: nothing cancels near 0."""
     spread = z * np.sqrt(s * ((trials - s) / trials) + z * z / 4.0) + z * z / 2.0
