@@ -35,13 +35,14 @@ from tadcore.statistics.intervals import band, ends
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
 from tadcore.statistics.stopping import level_of, stopping_of
+from tadcore.study.study import Study
 
 from .breakpoints import breakpoints
 from .replays import Replays, starts_of
 
 
 def radius_curve(
-    source: Scenario | TrialOutcomes,
+    source: Scenario | Study | TrialOutcomes,
     positions: ArrayLike | None = None,
     *,
     player: str = "d1",
@@ -58,9 +59,9 @@ def radius_curve(
 
     Parameters
     ----------
-    source : Scenario or StudyResult
-        The game, or a finished study whose trials are played again; what the study varies stays varied, but for the
-        radius in question.
+    source : Scenario, Study or StudyResult
+        The game, or a study whose trials are played, again or for the first time. What it varies stays varied, but for
+        the radius in question.
     positions : array_like, shape (M, n + 2, dim), optional
         M independent starts; required with a Scenario, and not taken with a study.
     player : str

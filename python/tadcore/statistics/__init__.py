@@ -8,7 +8,7 @@ from .comparison import Comparison, compare, difference_interval, paired
 from .incidence import Incidence, incidence, incidence_of
 from .intervals import OutcomeProbabilities, probabilities, probabilities_of, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
-from .radius import Breakpoints, RadiusCurve
+from .radius import Breakpoints, RadiusCurve, SmallestRadius
 from .sequences import HalfWidth, mixture_interval
 from .stopping import Stopping
 
@@ -19,6 +19,7 @@ __all__ = [
     "Incidence",
     "OutcomeProbabilities",
     "RadiusCurve",
+    "SmallestRadius",
     "Stopping",
     "TrialOutcomes",
     "compare",

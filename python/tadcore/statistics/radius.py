@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, Integers
 from tadcore._shared.shares import estimate, percent
+from tadcore.errors import ScenarioError
 
 from .comparison import difference_interval
 
@@ -50,6 +51,43 @@ class Breakpoints:
 
     def __repr__(self) -> str:
         return f"Breakpoints({len(self):,} in {len(np.unique(self.trial)):,} trials)"
+
+
+@dataclass(frozen=True, repr=False)
+class SmallestRadius:
+    """The smallest radius at which an outcome is surely probable enough, or that there is none.
+
+    Attributes
+    ----------
+    outcome : str
+        The event.
+    at_least : float
+        What its probability was to reach.
+    radius : float or None
+        The smallest of the radii played whose band begins at ``at_least`` or above; None where none does.
+    best : float
+        The radius where the event came most often.
+    estimate, low, high : float
+        P(outcome) at ``radius``, or at ``best`` where there is none, with the band that holds at all radii at once.
+    level : float
+        Confidence level of the band.
+    """
+
+    outcome: str
+    at_least: float
+    radius: float | None
+    best: float
+    estimate: float
+    low: float
+    high: float
+    level: float
+
+    def __repr__(self) -> str:
+        shown = " ".join(estimate(self.estimate, self.low, self.high))
+        found = f"P({self.outcome}) = {shown}, {percent(self.level)} at all radii at once"
+        if self.radius is None:
+            return f"none reaches {self.at_least:g}; the best is {self.best:g}: {found}"
+        return f"{self.radius:g}: {found}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,6 +152,48 @@ class RadiusCurve:
     def trials(self) -> int:
         """M."""
         return int(self.kind.shape[1])
+
+    def smallest(self, at_least: float, outcome: str = "intercepted") -> SmallestRadius:
+        """The smallest of the radii played at which an outcome surely has at least this probability.
+
+        Surely: the lower end of the band, which holds at all radii at once, reaches it. P need not grow with a radius,
+        so a larger radius may fall short again; and a smaller one, between those played, may do.
+
+        Parameters
+        ----------
+        at_least : float
+            A probability in (0, 1).
+        outcome : str
+            One of `names`.
+
+        Returns
+        -------
+        SmallestRadius
+            The radius, or that none of them does and which is the best.
+
+        Raises
+        ------
+        ScenarioError
+            No such probability or outcome.
+        """
+        if not (isinstance(at_least, int | float | np.floating) and 0.0 < at_least < 1.0):
+            raise ScenarioError("at_least", at_least, "a probability in (0, 1)")
+        if outcome not in self.names:
+            raise ScenarioError("outcome", outcome, f"one of {', '.join(self.names)}")
+        row = self.names.index(outcome)
+        reached = np.flatnonzero(self.band_low[row] >= at_least)
+        best = int(self.estimate[row].argmax())
+        r = int(reached[0]) if reached.size else best
+        return SmallestRadius(
+            outcome=outcome,
+            at_least=float(at_least),
+            radius=float(self.radii[r]) if reached.size else None,
+            best=float(self.radii[best]),
+            estimate=float(self.estimate[row, r]),
+            low=float(self.band_low[row, r]),
+            high=float(self.band_high[row, r]),
+            level=self.level,
+        )
 
     def to_xarray(self) -> xarray.Dataset:
         """The curves over (outcome, radius), the slopes over (outcome, interval)."""

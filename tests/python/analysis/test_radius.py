@@ -8,6 +8,7 @@ from scipy import stats
 
 import tadcore
 from tadcore import ScenarioError, radius_curve
+from tadcore.sampling import Disk
 from tadcore.statistics import paired, probabilities, proportion_interval
 from tadcore.statistics.intervals import ends
 
@@ -48,6 +49,22 @@ def test_every_radius_is_a_batch_of_its_own(sc, positions, curve):
         assert np.array_equal((curve.band_low[:, r], curve.band_high[:, r]), wide)
     assert ((curve.band_low <= curve.low) & (curve.high <= curve.band_high)).all()
     assert np.ptp(curve.estimate[2]) > 0.1
+
+
+def test_the_smallest_radius_is_the_first_whose_band_reaches(curve):
+    for outcome, row in (("intercepted", 2), ("captured", 1)):
+        for least in (0.05, 0.2, 0.5, 0.9):
+            found = curve.smallest(least, outcome)
+            reaching = [r for r, low in zip(RADII, curve.band_low[row], strict=True) if low >= least]
+            assert found.radius == (reaching[0] if reaching else None)
+            assert found.best == RADII[curve.estimate[row].argmax()]
+            shown = list(RADII).index(found.radius if reaching else found.best)
+            assert (found.low, found.high) == (curve.band_low[row, shown], curve.band_high[row, shown])
+    assert repr(curve.smallest(0.99)).startswith("none reaches 0.99; the best is ")
+    with pytest.raises(ScenarioError, match="at_least"):
+        curve.smallest(1.0)
+    with pytest.raises(ScenarioError, match="one of timeout"):
+        curve.smallest(0.5, "d9")
 
 
 def test_differences_and_slopes_are_paired(curve):
@@ -236,3 +253,9 @@ def test_wilson_s_intervals_would_not_hold_there():
     low, high = proportion_interval(counts, 1000, level=1 - 0.05 / 21)
     missed = stats.binom.pmf(counts, 1000, p)[(low > p) | (p > high)].sum()
     assert missed == pytest.approx(0.086, abs=0.001)
+
+
+def test_a_study_need_not_be_played_first(sc):
+    study = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 1.0)}, trials=40, seed=3)
+    fresh, played = (radius_curve(source, player="d1", radii=[1.0, 5.0]) for source in (study, study.run()))
+    assert np.array_equal(fresh.kind, played.kind)
