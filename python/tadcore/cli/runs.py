@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from tadcore import scenarios as bundled
+from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
 
 from .options import FAILED, Changes, Source, read, usable
@@ -20,7 +21,7 @@ def simulate(
     changes: Changes = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there."),
+        typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there; or one file, FILE.nc."),
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw the run: into DIR, or in windows.")] = False,
 ) -> None:
@@ -33,10 +34,15 @@ def simulate(
       tadcore simulate paper-i1 --set 'd*.visibility_radius=inf'
 
     With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
-    --plot also the figures, as PNG and PDF.
+    --plot also the figures, as PNG and PDF. A name that ends in .nc is that file alone.
     """
     sc = read(scenario, changes)
-    usable(out)
+    if out is not None and out.suffix.lower() == ".nc":
+        if plot:
+            raise ScenarioError("--out", str(out), "a folder, into which --plot draws")
+        destination(out)
+    else:
+        usable(out)
     if plot and out is None and not _has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
     from tadcore.simulation.run import simulate as play
