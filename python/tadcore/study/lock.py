@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from filelock import FileLock, SoftFileLock, Timeout
 
-from tadcore._shared.files import PARTIAL
+from tadcore._shared.files import PARTIAL, strange
 from tadcore.errors import StoreError
 
 LOCK = "_store.lock"
@@ -49,6 +49,9 @@ def alone(folder: Path) -> Iterator[None]:
     path = folder / LOCK
     if path.is_symlink():
         raise StoreError(str(path), "it is a link, and a store writes nothing outside its folder", "remove the link")
+    found = strange(path) if path.exists() else None
+    if found is not None:
+        raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
     native = _has_locks(path)
     lock = FileLock(path, timeout=0) if native else SoftFileLock(path, timeout=0)
     if not native:

@@ -114,11 +114,11 @@ class Trials:
         return compare(self, other, level=level)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The table as a pandas data frame."""
+        """The table as a pandas data frame; ``outcome`` is a categorical."""
         return self.table.to_pandas()
 
     def to_polars(self) -> polars.DataFrame:
-        """The table as a Polars data frame; Polars must be installed."""
+        """The table as a Polars data frame, ``outcome`` as a categorical; Polars must be installed."""
         import polars
 
         frame = polars.from_arrow(self.table)

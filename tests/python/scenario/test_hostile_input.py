@@ -58,6 +58,18 @@ def test_what_is_no_file_is_refused_in_a_store(tmp_path, kind, name):
         assert caught.value.path == str(folder / name)
 
 
+@KINDS
+def test_what_is_no_lock_is_refused_in_a_store(tmp_path, kind):
+    folder = tmp_path / "store"
+    whole = study(300).run(store=folder)
+    put(folder / "_store.lock", kind)
+    words = "it is a link" if kind == "a device" else f"it is {kind}, not a file"
+    with pytest.raises(StoreError, match=words) as caught:
+        study(300).run(store=folder)
+    assert caught.value.path == str(folder / "_store.lock")
+    assert tadcore.load_study(folder).table.equals(whole.table)
+
+
 def test_a_pipe_for_a_table_of_gains_is_refused(tmp_path):
     put(tmp_path / "table", "a pipe")
     with pytest.raises(ScenarioError, match="must be a table that a study has saved, or a new name: this is a pipe"):
