@@ -107,7 +107,8 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     * A regular file, or a name that is free: the content is written beside it, brought to the disk and renamed, so no
       reader meets half a file. A file that was there keeps its mode and, where the system lets it, its owner; a new one
-      has the mode that the umask gives.
+      has the mode that the umask gives. Its other names (hard links) keep the old content. A file that is a mount point
+      can only be written in place.
     * A symbolic link stays, and what it leads to is written.
     * A device, a pipe, ``/dev/stdout`` or another open descriptor receives the content, and stays what it is.
 
@@ -174,7 +175,13 @@ def _beside(target: Path, there: os.stat_result | None, suffix: str) -> Iterator
             os.fsync(stream.fileno())
         if there is not None:
             _dress(partial, there, mode)
-        partial.replace(target)
+        try:
+            partial.replace(target)
+        except OSError as error:
+            if error.errno != errno.EBUSY:
+                raise
+            shutil.copyfile(partial, target)  # a single file mounted into a container cannot be another file
+            partial.unlink()
     except BaseException:
         with suppress(OSError):
             partial.unlink()
