@@ -1,23 +1,21 @@
-"""Reading TOML with errors that name the line, and writing files that appear whole or not at all."""
+"""Paths from outside, and files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import errno
 import os
-import re
 import secrets
 import shutil
 import stat
 import sys
 import tempfile
 import time
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from tadcore.errors import MISSING, ScenarioError
+from tadcore.errors import ScenarioError
 
 MOST = 8 << 20
 """Bytes of a text file that is read at all: what a reader makes of it takes many times as much."""
@@ -33,10 +31,6 @@ _REFUSED = (
 _THROUGH = os.O_WRONLY | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
 _PATIENCE = 10.0  # seconds until a pipe without a reader is refused
 _LINKS = 40  # in a chain, as many as Linux follows
-_DEEPEST = 100
-_PART = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
-# A dotted key of n parts takes the parser n² of memory.
-_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{_DEEPEST}}}")
 _KINDS = ((stat.S_ISREG, None), (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
 
 
@@ -55,50 +49,6 @@ def strange(path: str | os.PathLike[str]) -> str | None:
     """
     mode = Path(path).stat().st_mode
     return next((word for holds, word in _KINDS if holds(mode)), "a device")
-
-
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a file; raises `ScenarioError` where there is none."""
-    file = as_path("path", path)
-    name = os.fspath(path)
-    try:
-        found = strange(file)
-        if found is not None:
-            raise ScenarioError(name, found, "a file")
-        with file.open("rb") as stream:
-            data = stream.read(MOST + 1)
-        if len(data) > MOST:
-            raise ScenarioError(name, "a larger one", f"a file of at most {MOST >> 20} MiB")
-        return data.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise ScenarioError(name, MISSING, "a file that exists") from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(name, error.object[error.start : error.end], "text in UTF-8") from None
-    except OSError as error:
-        raise ScenarioError(name, error.strerror or str(error), "a file that can be read") from None
-
-
-def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML text; raises `ScenarioError` naming the line that cannot be read."""
-    long = _LONG_KEY.search(text)
-    if long is not None:
-        line = text.count("\n", 0, long.start()) + 1
-        raise ScenarioError(f"{name}, line {line}", long[0], f"valid TOML with keys of at most {_DEEPEST} parts")
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a TOMLDecodeError, or a number or a nesting beyond all bounds
-        place = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        reason = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
-        if "digits" in reason:
-            reason = "an integer has too many digits"
-        if isinstance(error, RecursionError):
-            reason = "arrays or tables are nested too deeply"
-        if place is None:
-            last = "at end of document" in str(error)
-            raise ScenarioError(f"{name}, at the end" if last else name, MISSING, f"valid TOML ({reason})") from None
-        line = int(place[1])
-        found = text.split("\n")[line - 1].strip() if line <= text.count("\n") + 1 else MISSING
-        raise ScenarioError(f"{name}, line {line}", found, f"valid TOML ({reason})") from None
 
 
 @contextmanager

@@ -30,7 +30,7 @@ from tadcore.statistics.outcomes import as_level
 from tadcore.statistics.stopping import level_of, stopping_of
 from tadcore.study.study import Study
 
-from .maps import axis_of_grid, height
+from .maps import grid_of, height
 from .replays import Placed
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def probability_map(
     stopping = stopping_of(source)
     confidence = level_of(stopping, level)
     games = Placed(source, player, threads)
-    sc, columns, rows = games.sc, axis_of_grid("x", x), axis_of_grid("y", y)
+    sc, (columns, rows) = games.sc, grid_of(x, y)
     up = height(sc, games.player, z)
     places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     if up is not None:

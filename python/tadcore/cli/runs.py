@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +13,8 @@ from tadcore import scenarios as bundled
 from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
 
-from .options import FAILED, Changes, Source, read, usable
-from .terminal import complain, say
+from .options import FAILED, Changes, Source, has_windows, read, usable
+from .terminal import complain, say, spill
 
 
 def simulate(
@@ -43,7 +44,7 @@ def simulate(
         destination(out)
     else:
         usable(out)
-    if plot and out is None and not _has_windows():
+    if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
     from tadcore.simulation.run import simulate as play
 
@@ -71,7 +72,7 @@ def scenarios(
       tadcore scenarios paper-i1 > my.toml
     """
     if name is not None:
-        typer.echo(bundled.text(name), nl=False)
+        spill(bundled.text(name))
         return
     for known in bundled.names():
         say(known)
@@ -105,26 +106,22 @@ def _lines(run: Any, most: int = 20) -> list[str]:
     return [*lines, f"costs J: {costs}"]
 
 
-def _has_windows() -> bool:
-    import matplotlib as mpl
-
-    return str(mpl.get_backend()).lower() not in {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
-
-
 def _draw(run: Any, out: Path | None) -> None:
     """The figures of one run: saved into a folder, or shown."""
-    import matplotlib.pyplot as plt
-
     from tadcore import plotting
+    from tadcore.plotting.tools.axes import for_files
 
-    with plotting.style():
+    with contextlib.nullcontext() if out is None else for_files(), plotting.style():
         drawn = {"trajectories": run.plot.trajectories(), "network": run.plot.network()}
         drawn |= {f"control-{axis}": run.plot.controls(axis=axis) for axis in "xyz"[: run.scenario.dim]}
         drawn |= {name: getattr(run.plot, name)() for name in ("distances", "visibility", "gains", "theta")}
         figures = {name: (axes if hasattr(axes, "figure") else axes.flat[0]).figure for name, axes in drawn.items()}
-        if out is None:
-            plt.show()
-        for name, figure in figures.items():
-            if out is not None:
+        if out is not None:
+            for name, figure in figures.items():
                 plotting.save(figure, out / name)
+            return
+        import matplotlib.pyplot as plt
+
+        plt.show()
+        for figure in figures.values():
             plt.close(figure)

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from tadcore._shared.shares import percent
+from tadcore._shared.toml import STDIN, read_stdin
 
 from .terminal import complain, say
 
@@ -16,7 +17,7 @@ _INTERRUPTED = 130
 
 
 def study(
-    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary and how, and the number of trials.")],
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")],
     store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     table: Annotated[
@@ -50,7 +51,10 @@ def study(
     from tadcore.study.manifest import Manifest
     from tadcore.study.study import Study
 
-    wanted = Study.from_toml(file)
+    if str(file) == STDIN:
+        wanted = Study.from_toml_string(read_stdin(), name="standard input")
+    else:
+        wanted = Study.from_toml(file)
     if resume:
         Manifest.read(store)
     try:

@@ -13,6 +13,7 @@ import numpy as np
 from tadcore import plotting, statistics
 from tadcore._shared.arrays import Floats
 from tadcore._shared.shares import percent
+from tadcore.plotting.tools.axes import for_files
 from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
 from tadcore.statistics.outcomes import indicators
@@ -175,11 +176,8 @@ def origin(result: Reported) -> Section:
 
 def _picture(caption: str, draw: Callable[[Any], Any], what: Any, *, wide: bool = False) -> Picture:
     """Draw one figure in the style of the package, as a PNG: hatches and curves of many steps make vectors large."""
-    import matplotlib.pyplot as plt
-
     stream = io.BytesIO()
-    with plotting.style():
+    with for_files(), plotting.style():
         figure: Any = np.asarray(draw(what), dtype=object).flat[0].figure
         figure.savefig(stream, format="png", dpi=_DPI)
-        plt.close(figure)
     return Picture(caption, base64.b64encode(stream.getvalue()).decode("ascii"), wide)

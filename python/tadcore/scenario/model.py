@@ -32,8 +32,9 @@ import tomli_w
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tadcore._shared.arrays import Floats
-from tadcore._shared.files import parse_toml, read_text, write_whole
+from tadcore._shared.files import write_whole
 from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
+from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import ScenarioError
 
 from .checked import CheckedModel

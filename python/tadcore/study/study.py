@@ -183,6 +183,16 @@ class Study:
 
         return cls(**read_study(path))
 
+    @classmethod
+    def from_toml_string(cls, text: str, *, name: str = "study", folder: str | os.PathLike[str] = ".") -> Study:
+        """Read a study from a TOML text.
+
+        Errors of syntax are reported under ``name``; the file of a scenario is looked for in ``folder``.
+        """
+        from .toml import parse_study
+
+        return cls(**parse_study(text, name, as_path("folder", folder)))
+
     def run(
         self,
         *,

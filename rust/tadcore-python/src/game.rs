@@ -225,6 +225,11 @@ impl Game {
         Ok(PyBytes::new(py, &bytes))
     }
 
+    /// The bytes of the saved table that begins with these.
+    fn table_length(&self, py: Python<'_>, start: &[u8]) -> PyResult<u64> {
+        self.policy(py)?.transitions_length(start).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
     /// Adds the entries of a saved table; the number of entries held afterwards.
     fn load_table(&self, py: Python<'_>, table: &[u8]) -> PyResult<usize> {
         let policy = self.policy(py)?;
