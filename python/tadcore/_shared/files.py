@@ -37,9 +37,18 @@ _KINDS = ((stat.S_ISREG, None), (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a p
 def as_path(field: str, value: Any) -> Path:
     """A path from a string or a path; raises `ScenarioError` for what cannot name anything."""
     name = value if isinstance(value, str) else value.__fspath__() if isinstance(value, os.PathLike) else None
-    if not isinstance(name, str) or not name or "\0" in name:
+    if not isinstance(name, str) or not name or "\0" in name or not _encodable(name):
         raise ScenarioError(field, value, "a path: a string or a pathlib.Path, without \\0")
     return Path(name)
+
+
+def _encodable(name: str) -> bool:
+    """Whether the system can write the name: not where it holds half of a surrogate pair."""
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def strange(path: str | os.PathLike[str]) -> str | None:

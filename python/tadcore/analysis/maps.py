@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
-from tadcore._shared.files import destination, write_whole
+from tadcore._shared.files import as_path, destination, write_whole
 from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
@@ -81,7 +83,7 @@ class OutcomeMap:
         ScenarioError
             The file name ends in something else.
         """
-        target = Path(path)
+        target = as_path("path", path)
         check_destination("path", target)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.suffix == ".nc":
@@ -150,9 +152,8 @@ def outcome_map(
 
     from tadcore.scenario.provenance import provenance
 
-    player = label(player)
-    if player not in sc.players:
-        raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")
+    as_scenario(sc)
+    player = one_of("player", label(player), sc.players)
     (columns, rows), up = grid_of(x, y), height(sc, player, z)
     who = sc.players.index(player)
     shape = (len(rows), len(columns))

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import simulate_batch
@@ -62,10 +64,12 @@ def sensitivity(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
+    as_scenario(sc)
+    if not isinstance(inputs, Mapping):
+        raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
     known = (*outcome_names(sc.n), "time")
     for output in outputs:
-        if output not in known:
-            raise ScenarioError("outputs", output, f"one of {', '.join(known)}")
+        one_of("outputs", output, known)
     for name in inputs:
         component(sc, name)
 

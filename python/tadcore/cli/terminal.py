@@ -5,16 +5,15 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
+from tadcore._shared.console import console
+
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-_NARROWEST, _WIDEST = 20, 10_000
-
-
 def say(text: str, *, indent: int = 0) -> None:
     """Print to standard output; folded to the width of a terminal, untouched in a pipe."""
-    _print(_console(stderr=False), text, indent)
+    _print(console(stderr=False), text, indent)
 
 
 def spill(text: str) -> None:
@@ -31,22 +30,14 @@ def spill(text: str) -> None:
 
 def complain(text: str) -> None:
     """Print an error to standard error."""
-    _print(_console(stderr=True), f"error: {text}", 0)
+    _print(console(stderr=True), f"error: {text}", 0)
 
 
-def _console(*, stderr: bool) -> Console:
-    from rich.console import Console
-
-    console = Console(stderr=stderr, highlight=False, markup=False, emoji=False)
-    console.width = min(max(console.width, _NARROWEST), _WIDEST)  # COLUMNS=0 would leave no room for a letter
-    return console
-
-
-def _print(console: Console, text: str, indent: int) -> None:
+def _print(to: Console, text: str, indent: int) -> None:
     from rich.text import Text
 
     for line in text.split("\n"):
-        room = console.width - indent
-        for part in Text(line).wrap(console, room) if console.is_terminal else [Text(line)]:
+        room = to.width - indent
+        for part in Text(line).wrap(to, room) if to.is_terminal else [Text(line)]:
             part.rstrip()
-            console.print(Text(" " * indent) + part, soft_wrap=True)
+            to.print(Text(" " * indent) + part, soft_wrap=True)

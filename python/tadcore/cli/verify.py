@@ -21,7 +21,9 @@ def verify(
     scenario: Source,
     changes: Changes = None,
     deviations: Annotated[int, typer.Option(min=0, max=_MOST, help="Random deviations of each player.")] = 2,
-    starts: Annotated[int, typer.Option(min=0, max=_MOST, help="Random starts of the synthesis at chosen instants.")] = 0,
+    starts: Annotated[
+        int, typer.Option(min=0, max=_MOST, help="Random starts of the synthesis at chosen instants.")
+    ] = 0,
     seed: Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Key of everything random.")] = 0,
     bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
     out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,

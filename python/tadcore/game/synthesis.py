@@ -22,7 +22,7 @@ from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
-from .compiled import game_of
+from .compiled import as_scenario, game_of
 from .network import VisibilityNetwork
 
 _TERMS = {"I1": ("dQ_d", "dQ_tau", "dQ_a", "S1"), "I2": ("dQ", "S2", "S3")}
@@ -129,10 +129,11 @@ def synthesize(
     >>> bool((blind.rows == 0).all())
     True
     """
+    as_scenario(sc)
     shape = (len(sc.constrained), sc.n + 1)
     seen = as_adjacency(adjacency, shape)
     k = as_index("step", step, sc.steps)
-    if method not in ("newton", "descent"):
+    if not isinstance(method, str) or method not in ("newton", "descent"):
         raise ScenarioError("method", method, '"newton" or "descent"')
     limit = None if max_iterations is None else as_index("max_iterations", max_iterations, 2**31 - 1, least=1)
     core = game_of(sc).synthesize(k, seen, method=method, max_iterations=limit)

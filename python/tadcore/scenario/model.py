@@ -32,7 +32,7 @@ import tomli_w
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tadcore._shared.arrays import Floats
-from tadcore._shared.files import write_whole
+from tadcore._shared.files import as_path, write_whole
 from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
 from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import ScenarioError
@@ -250,7 +250,7 @@ class Scenario(CheckedModel):
         # Arrays here hold a few numbers: they read better on one line.
         text = _ARRAY.sub(lambda lines: f"[{' '.join(lines[1].split())[:-1]}]", tomli_w.dumps(self.model_dump()))
         if path is not None:
-            write_whole(path, text)
+            write_whole(as_path("path", path), text)
         return text
 
     def describe(self) -> str:

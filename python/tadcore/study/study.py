@@ -35,7 +35,7 @@ import pyarrow as pa
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError, StoreError
-from tadcore.game.compiled import game_of
+from tadcore.game.compiled import as_scenario, game_of
 from tadcore.sampling.adapters import as_sampler, from_table
 from tadcore.sampling.base import Sampler
 from tadcore.sampling.design import DESIGNS, Design
@@ -111,10 +111,11 @@ class Study:
     ) -> None:
         if not isinstance(sc, Scenario):
             raise ScenarioError("sc", sc, "a tadcore.Scenario")
+        as_scenario(sc)
         if not isinstance(vary, Mapping) or not vary:
             example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
             raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
-        if design not in DESIGNS:
+        if not isinstance(design, str) or design not in DESIGNS:
             raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
         self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
         samplers: dict[str, Sampler] = {}

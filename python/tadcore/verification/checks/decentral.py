@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
@@ -206,6 +207,7 @@ def decentralise(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
+    as_scenario(sc)
     seen = as_adjacency(adjacency, (len(sc.constrained), sc.n + 1))
     k = as_index("step", step, sc.steps)
     delay = as_index("delay", delay, 1000)

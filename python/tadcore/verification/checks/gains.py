@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
 from tadcore.scenario.model import Scenario
@@ -220,6 +221,7 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
     CertificateRates
         The counts.
     """
+    as_scenario(sc)
     m = matrices_of(sc)
     values = m.values(solve_equilibrium(sc).P)
     shape = (len(sc.constrained), sc.n + 1)
