@@ -20,7 +20,7 @@ import numpy as np
 
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import OutcomeKind
-from tadcore.scenario.paths import expand, normal
+from tadcore.scenario.paths import expand, normal, short
 from tadcore.study.collect import StoppingRule
 from tadcore.study.study import Study, StudyResult
 
@@ -84,10 +84,11 @@ class SweepResult:
         Returns
         -------
         xarray.Dataset
-            Its dimensions are the swept paths and ``outcome``. Variables: ``count`` and ``probability`` (the share of
-            the trials) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time of all games) and
-            ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0 and shares and
-            times NaN; ``escape_time`` is NaN everywhere else.
+            Its dimensions are the swept paths, in normal form, and ``outcome``; a defender's path is there in its
+            short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count`` and ``probability`` (the
+            share of the trials) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time of all
+            games) and ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0 and
+            shares and times NaN; ``escape_time`` is NaN everywhere else.
         """
         import xarray as xr
 
@@ -102,7 +103,7 @@ class SweepResult:
 
         dims = tuple(self.grid)
         by_outcome = (*dims, "outcome")
-        return xr.Dataset(
+        made = xr.Dataset(
             {
                 "count": (by_outcome, over([row[0] for row in rows])),
                 "probability": (by_outcome, over([row[1] for row in rows])),
@@ -118,6 +119,10 @@ class SweepResult:
             },
             attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
         )
+        for path in self.grid:
+            if short(path) != path:  # the same values under the name that people write
+                made = made.assign_coords({short(path): (path, made[path].values)}).set_xindex(short(path))
+        return made
 
     def __repr__(self) -> str:
         size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())

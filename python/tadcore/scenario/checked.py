@@ -23,6 +23,7 @@ else:
 
 Model = TypeVar("Model")
 
+NO_FIELD = "the path of a field that exists, such as attacker.position or d1.position"
 _IMMUTABLE = "left as it is: scenarios are immutable, use replace"
 
 
@@ -127,7 +128,10 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
                 if name in taken:
                     raise ScenarioError(path, value, f'set once only: "{taken[name]}" sets it too')
                 taken[name] = path
-                _assign(data, name, path, value)
+                try:
+                    _assign(data, name, value)
+                except LookupError:
+                    raise ScenarioError(path, value, self._rule_of(path)) from None
         return type(self).model_validate(data)
 
     def _meant(self, path: Any, value: Any) -> Sequence[str]:
@@ -135,6 +139,10 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
         if not isinstance(path, str):
             raise ScenarioError(str(path), value, "named by a path such as attacker.position or d1.position")
         return [normal(path)]
+
+    def _rule_of(self, path: str, rule: str = NO_FIELD) -> str:
+        """What a path that leads nowhere must be."""
+        return rule
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """The fields to start a replacement from."""
@@ -155,23 +163,20 @@ def _translate(model: type[Any], error: ValidationError) -> ScenarioError:
     return scenario_error(error, model, model._root)
 
 
-_NO_FIELD = "the path of a field that exists, such as attacker.position or d1.position"
-
-
-def _assign(data: dict[str, Any], name: str, path: str, value: Any) -> None:
-    """Set the entry of a nested table that `name` means; tuples and models on the way are opened."""
+def _assign(data: dict[str, Any], name: str, value: Any) -> None:
+    """Set the entry of a nested table that `name` means, or raise LookupError; tuples and models are opened."""
     node: Any = data
     *way, last = name.split(".")
     for part in way:
-        key = _key(node, part, path, value)
+        key = _key(node, part)
         node[key] = node = _open(node[key])
     if isinstance(node, dict) and last.isidentifier():
         node[last] = value  # a field that does not exist is refused by the model, which knows the others
     else:
-        node[_key(node, last, path, value)] = value
+        node[_key(node, last)] = value
 
 
-def _key(node: Any, part: str, path: str, value: Any) -> str | int:
+def _key(node: Any, part: str) -> str | int:
     """The key of a part of a path in a table or a list."""
     if isinstance(node, dict) and part in node:
         return part
@@ -179,7 +184,7 @@ def _key(node: Any, part: str, path: str, value: Any) -> str | int:
         place = AXES.find(part) if part in ("x", "y", "z") else int(part) if part.isdecimal() and len(part) < 10 else -1
         if 0 <= place < len(node):
             return place
-    raise ScenarioError(path, value, _NO_FIELD)
+    raise LookupError(part)
 
 
 def _open(child: Any) -> Any:

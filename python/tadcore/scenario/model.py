@@ -37,7 +37,7 @@ from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
 from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import ScenarioError
 
-from .checked import CheckedModel
+from .checked import NO_FIELD, CheckedModel
 from .fields import (
     Fraction,
     Gamma,
@@ -49,6 +49,7 @@ from .fields import (
     is_team,
     refusal,
 )
+from .hints import hint, wildcards
 from .paths import beyond, expand
 
 _MOST_STEPS = 10_000_000
@@ -294,8 +295,13 @@ class Scenario(CheckedModel):
         if missing := beyond(self.n, path):
             raise ScenarioError(path, value, missing)
         if not names:
-            raise ScenarioError(path, value, "the path of a field that some player of this game has")
+            rule = "the path of a field that some player of this game has"
+            raise ScenarioError(path, value, self._rule_of(path, rule))
         return names
+
+    def _rule_of(self, path: str, rule: str = NO_FIELD) -> str:
+        nearest = hint(path, wildcards(self.paths))
+        return f"{rule}{nearest and f'; {nearest}'}"
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         data = self.model_dump()

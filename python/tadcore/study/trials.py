@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import ByPath
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
 from tadcore.statistics.stopping import Stopping
 
@@ -54,8 +55,11 @@ class Trials:
 
     @cached_property
     def inputs(self) -> dict[str, Floats]:
-        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column."""
-        return {name: self._column(name) for name in self.table.column_names if name not in FIXED}
+        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column.
+
+        Any spelling of a path finds it: ``inputs["d1.visibility_radius"]``.
+        """
+        return ByPath({name: self._column(name) for name in self.table.column_names if name not in FIXED})
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way."""
