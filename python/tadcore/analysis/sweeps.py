@@ -85,10 +85,11 @@ class SweepResult:
         -------
         xarray.Dataset
             Its dimensions are the swept paths, in normal form, and ``outcome``; a defender's path is there in its
-            short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count`` and ``probability`` (the
-            share of the trials) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time of all
-            games) and ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0 and
-            shares and times NaN; ``escape_time`` is NaN everywhere else.
+            short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count``, ``probability`` (the
+            share of the trials) with the ends ``low`` and ``high`` of its 95 % interval (as `StudyResult.probabilities`
+            has it, in each cell by itself) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time
+            of all games) and ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0
+            and shares and times NaN; ``escape_time`` is NaN everywhere else.
         """
         import xarray as xr
 
@@ -106,7 +107,9 @@ class SweepResult:
         made = xr.Dataset(
             {
                 "count": (by_outcome, over([row[0] for row in rows])),
-                "probability": (by_outcome, over([row[1] for row in rows])),
+                "probability": (by_outcome, over([row[1][0] for row in rows])),
+                "low": (by_outcome, over([row[1][1] for row in rows])),
+                "high": (by_outcome, over([row[1][2] for row in rows])),
                 "mean_time": (by_outcome, over([row[2] for row in rows])),
                 "trials": (dims, over([int(row[0].sum()) for row in rows])),
                 "mean_end": (dims, over([row[3] for row in rows])),
@@ -237,14 +240,16 @@ def _folder(point: Mapping[str, Any]) -> str:
 
 
 def _summary(result: StudyResult | None, kinds: Sequence[OutcomeKind]) -> tuple[Any, Any, Any, float]:
-    """Counts, shares and mean times by outcome, and the mean time of all."""
+    """Counts, shares with their intervals, and mean times by outcome, and the mean time of all."""
     if result is None:
         nothing = np.full(len(kinds), np.nan)
-        return np.zeros(len(kinds), dtype=np.int64), nothing, nothing, float("nan")
+        return np.zeros(len(kinds), dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
     counts = np.bincount(result.kind, minlength=len(kinds))
     total = np.bincount(result.kind, weights=result.time, minlength=len(kinds))
     means = np.divide(total, counts, out=np.full(len(kinds), np.nan), where=counts > 0)
-    return counts, counts / result.trials, means, float(result.time.mean())
+    found = result.probabilities(level=0.95)
+    shares = [values[: len(kinds)] for values in (found.estimate, found.low, found.high)]
+    return counts, shares, means, float(result.time.mean())
 
 
 def _labels(values: Sequence[Any]) -> list[Any]:

@@ -64,7 +64,7 @@ class Run:
     unconverged : int
         Instants at which the synthesis stopped short of its tolerance.
     certified : int
-        Rows of the record whose gains are proved to be globally optimal.
+        Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
         The rule by which edges form and break; zero in the paper's game. See `simulate`.
     """

@@ -57,7 +57,8 @@ class OutcomeProbabilities:
     method : {"wilson", "exact", "sequence"}
         How the intervals were made.
     rule : str
-        The rule that decided how many trials there are; empty where the number was fixed beforehand.
+        The rule that decided how many trials there are, or that their design is not random; empty for independent
+        trials of which the number was fixed beforehand.
     """
 
     names: tuple[str, ...]
@@ -110,7 +111,7 @@ def probabilities(
         Wilson's score interval, that of Clopper and Pearson, or a confidence sequence, the one that holds where the
         number of trials was not fixed beforehand.
     rule : str
-        What decided the number of trials, to be printed with them.
+        What decided the number of trials or their design, to be printed with them.
 
     Returns
     -------
@@ -171,13 +172,15 @@ def probabilities_of(
     if stopping is not None and method not in (None, "sequence"):
         raise ScenarioError("method", method, f'left out or "sequence": the study was {stopping}')
     by_default: Method = "wilson" if stopping is None else "sequence"
+    design = getattr(getattr(result, "study", None), "design", "random")
+    even = "" if design == "random" else f"{design} design: intervals are those of independent draws"
     return probabilities(
         result.kind,
         result.defender,
         result.scenario.n,
         level=level_of(stopping, level),
         method=by_default if method is None else method,
-        rule="" if stopping is None else str(stopping),
+        rule=even if stopping is None else str(stopping),
     )
 
 
@@ -226,8 +229,10 @@ def ends(count: Integers, trials: int, error: float, method: Method) -> tuple[Fl
         found = np.array([interval(one, trials, error) for one in distinct.tolist()]).reshape(-1, 2)
         return found[where, 0].reshape(s.shape), found[where, 1].reshape(s.shape)
     z = float(norm.isf(error / 2.0))
-    low, high = _score_low(s, trials, z), 1.0 - _score_low(trials - s, trials, z)
-    return low, np.where(s == 0.0, z * z / (trials + z * z), high)  # where 1 - 1 would be all that is left
+    rest = trials - s
+    few = 2.0 * s <= trials
+    low = np.where(few, _smaller(s, trials, z), 1.0 - _larger(rest, trials, z))
+    return low, np.where(few, _larger(s, trials, z), 1.0 - _smaller(rest, trials, z))
 
 
 def band(count: Integers, trials: int, error: float, many: int, method: Method) -> tuple[Floats, Floats]:
@@ -237,11 +242,19 @@ def band(count: Integers, trials: int, error: float, many: int, method: Method) 
     return ends(count, trials, 1.0 - together if together < 1.0 else error / many, method)
 
 
-def _score_low(s: Floats, trials: int, z: float) -> Floats:
+def _smaller(s: Floats, trials: int, z: float) -> Floats:
     """The smaller root of (s/M - p)² = z² p (1 - p) / M, its numerator made rational: nothing cancels near 0."""
-    spread = z * np.sqrt(s * ((trials - s) / trials) + z * z / 4.0) + z * z / 2.0
-    found = (s * s / trials) / np.maximum(s + spread, np.finfo(float).tiny)
+    found = (s * s / trials) / np.maximum(s + _spread(s, trials, z), np.finfo(float).tiny)
     return np.minimum(found, s / trials)
+
+
+def _larger(s: Floats, trials: int, z: float) -> Floats:
+    """The larger root."""
+    return np.maximum((s + _spread(s, trials, z)) / (trials + z * z), s / trials)
+
+
+def _spread(s: Floats, trials: int, z: float) -> Floats:
+    return z * np.sqrt(s * ((trials - s) / trials) + z * z / 4.0) + z * z / 2.0
 
 
 def _tails(count: int, trials: int, error: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, Integers
-from tadcore._shared.shares import estimate, percent
+from tadcore._shared.shares import estimate, percent, share
 from tadcore.errors import ScenarioError
 
 from .comparison import difference_interval
@@ -55,7 +55,7 @@ class Breakpoints:
 
 @dataclass(frozen=True, repr=False)
 class SmallestRadius:
-    """The smallest radius at which an outcome is surely probable enough, or that there is none.
+    """The smallest radius at which an outcome is probable enough with confidence, or that there is none.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class SmallestRadius:
         shown = " ".join(estimate(self.estimate, self.low, self.high))
         found = f"P({self.outcome}) = {shown}, {percent(self.level)} at all radii at once"
         if self.radius is None:
-            return f"none reaches {self.at_least:g}; the best is {self.best:g}: {found}"
+            return f"none reaches {share(self.at_least, 2)}; the best is {self.best:g}: {found}"
         return f"{self.radius:g}: {found}"
 
 
@@ -154,9 +154,9 @@ class RadiusCurve:
         return int(self.kind.shape[1])
 
     def smallest(self, at_least: float, outcome: str = "intercepted") -> SmallestRadius:
-        """The smallest of the radii played at which an outcome surely has at least this probability.
+        """The smallest of the radii played at which an outcome has at least this probability, at the band's level.
 
-        Surely: the lower end of the band, which holds at all radii at once, reaches it. P need not grow with a radius,
+        That is: the lower end of the band, which holds at all radii at once, reaches it. P need not grow with a radius,
         so a larger radius may fall short again; and a smaller one, between those played, may do.
 
         Parameters

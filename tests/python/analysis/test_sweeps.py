@@ -7,6 +7,7 @@ import tadcore
 from study_cases import CHUNK, ESCAPE, escaping, parts, study
 from tadcore import ScenarioError, Study, sweep
 from tadcore.sampling import Box
+from tadcore.statistics import proportion_interval
 
 
 def test_every_cell_is_the_study_of_its_scenario():
@@ -26,6 +27,8 @@ def test_every_cell_is_the_study_of_its_scenario():
             at = data.sel({"attacker.control_weight": weight, "horizon": horizon})
             assert {str(k): int(v) for k, v in zip(at["outcome"].values, at["count"], strict=True)} == alone.counts()
             assert float(at["probability"].sum()) == pytest.approx(1.0)
+            ends = proportion_interval(at["count"].values, 400)
+            assert np.array_equal((at["low"].values, at["high"].values), ends)
             for kind, mean in enumerate(at["mean_time"].values):
                 times = alone.time[alone.kind == kind]
                 assert np.isnan(mean) if not len(times) else mean == pytest.approx(times.mean())
@@ -47,7 +50,7 @@ def test_a_cell_without_equilibrium_is_a_result():
     assert data["escape_time"].values[2:] == pytest.approx([ESCAPE] * 2, rel=1e-9)
     assert np.isnan(data["escape_time"].values[:2]).all()
     assert data["trials"].values.tolist() == [100, 100, 0, 0]
-    assert np.isnan(data["probability"].values[2:]).all()
+    assert np.isnan([data[name].values[2:] for name in ("probability", "low", "high")]).all()
     assert swept.cells[2].result is None
     assert repr(swept) == "SweepResult(horizon (4); 2 without equilibrium)"
 

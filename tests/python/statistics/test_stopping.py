@@ -159,6 +159,11 @@ def test_a_study_without_a_rule_is_as_before(full):
     assert np.array_equal((found.low, found.high), (low, high))
 
 
+def test_a_design_that_is_not_random_says_so():
+    found = study_of(64).replace(design="sobol").run().probabilities()
+    assert repr(found).splitlines()[0] == "64 trials, sobol design: intervals are those of independent draws"
+
+
 def test_bands_of_incidence_hold_at_every_look(stopped, full):
     found, plain = stopped.incidence(), full.incidence()
     assert stats.kstwo.sf(found.half_width, CHUNK) == pytest.approx(0.05 / 2, rel=1e-6)  # the first look
