@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from tadcore._shared.files import as_path, write_whole
+from tadcore._shared.files import as_path, destination, write_whole
 from tadcore.errors import ScenarioError
 from tadcore.scenario.provenance import provenance
 
@@ -42,6 +42,7 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
     target = as_path("out", out)
     if target.is_dir():
         raise ScenarioError("out", str(out), "a file to write, not a folder")
+    destination(target)
     sc = result.scenario
     loader = PackageLoader("tadcore.report")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
