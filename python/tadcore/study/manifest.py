@@ -108,8 +108,8 @@ class Manifest:
     def read(cls, folder: str | os.PathLike[str]) -> Manifest:
         """The manifest of a store; raises `StoreError` where there is none that can be read."""
         path = Path(folder) / MANIFEST
-        refuse_old(Path(folder))
         try:
+            refuse_old(Path(folder))
             found = strange(path)
             if found is not None:
                 raise StoreError(str(path), f"it is {found}, not a file", "name the folder of a study")
