@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -68,15 +68,22 @@ def sensitivity(
     if not isinstance(inputs, Mapping):
         raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
     known = (*outcome_names(sc.n), "time")
-    for output in outputs:
+    if isinstance(outputs, str) or not isinstance(outputs, Iterable):
+        raise ScenarioError("outputs", outputs, f"a sequence of names, each one of {', '.join(known)}")
+    wanted = tuple(outputs)
+    for output in wanted:
         one_of("outputs", output, known)
+    taken: dict[str, str] = {}
     for name in inputs:
-        component(sc, name)
+        path = component(sc, name).path
+        if path in taken:
+            raise ScenarioError(f"inputs[{name!r}]", name, f"named once only: {taken[path]!r} is the same number")
+        taken[path] = name
 
     def play(x: Floats) -> Floats:
         rows = rows_of(sc, dict(zip(inputs, x, strict=True)), x.shape[1])
         batch = simulate_batch(sc, rows.positions, rows.visibility_radii, rows.capture_radii, threads=threads)
         found = np.vstack([indicators(batch.kind, batch.defender, sc.n), batch.time])
-        return np.asarray(found[[known.index(output) for output in outputs]], dtype=np.float64)
+        return np.asarray(found[[known.index(output) for output in wanted]], dtype=np.float64)
 
-    return sobol(play, inputs, tuple(outputs), points=points, seed=seed, level=level, resamples=resamples)
+    return sobol(play, inputs, wanted, points=points, seed=seed, level=level, resamples=resamples)

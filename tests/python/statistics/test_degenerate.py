@@ -3,14 +3,17 @@
 import math
 import warnings
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import stats
 
 import tadcore
-from tadcore import HalfWidth, ScenarioError, radius_curve
+from tadcore import HalfWidth, ScenarioError, plotting, radius_curve
 from tadcore.analysis import sensitivity, sobol
+from tadcore.sampling import Disk
 from tadcore.statistics import (
     difference_interval,
     incidence,
@@ -287,3 +290,58 @@ def test_curves_of_one_trial(radii, level):
         assert np.isfinite(getattr(curve, name)).all()
     assert "nan" not in repr(curve)
     assert curve.slope.shape == (6, len(radii) - 1)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, INF, math.nan, "x", None, True])
+def test_tolerances_are_checked(tolerance):
+    sc = tadcore.scenarios.load("paper-i1")
+    with pytest.raises(ScenarioError, match="tolerance"):
+        radius_curve(sc, [sc.positions], radii=[1.0, 2.0], refine=True, tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"outputs": "time"}, "outputs"),
+        ({"outputs": 5}, "outputs"),
+        ({"outputs": [["time"]]}, "outputs"),
+        ({"inputs": dict.fromkeys(("d1.visibility_radius", "defenders[0].visibility_radius"), stats.uniform(1, 1))},
+         "inputs['defenders[0].visibility_radius']"),
+        ({"inputs": {"attacker.position.x": stats.uniform(0, 0)}}, "inputs['attacker.position.x']"),
+    ],
+)  # fmt: skip
+def test_inputs_and_outputs_of_games_are_checked(options, field):
+    sc = tadcore.scenarios.load("paper-i1")
+    with pytest.raises(ScenarioError) as caught:
+        sensitivity(sc, **{"inputs": {"attacker.position.x": stats.uniform(-3, 6)}, "points": 4, **options})
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("level", [1 - 1e-16, 0.95, 1e-300])
+def test_figures_of_one_trial_are_drawn_or_refused(level):
+    mpl.use("Agg")
+    sc = tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": 0.05})
+    one = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 0.5)}, trials=1, seed=1).run()
+    curves = {
+        radii: radius_curve(sc, [sc.positions], radii=radii, level=level) for radii in [(1.0,), (INF,), (1.0, 2.0)]
+    }
+    drawn = [
+        lambda: plotting.outcome_probabilities(one.probabilities(level=level)),
+        lambda: plotting.incidence(one.incidence(level=level)),
+        lambda: plotting.incidence(one.incidence(level=level), stacked=False),
+        lambda: plotting.comparison(one.compare(one, level=level)),
+        *(
+            lambda q=q: plotting.radius_curve(curves[1.0, 2.0], quantity=q)
+            for q in ("probability", "difference", "slope")
+        ),
+        *(lambda q=q: plotting.radius_curve(curves[(1.0,)], quantity=q) for q in ("probability", "difference")),
+    ]
+    for draw in drawn:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            figure = draw().figure
+            figure.canvas.draw()
+            plt.close(figure)
+    for radii, quantity in (((INF,), "probability"), ((INF,), "slope"), ((1.0,), "slope")):
+        with pytest.raises(ValueError, match="finite radi"):
+            plotting.radius_curve(curves[radii], quantity=quantity)

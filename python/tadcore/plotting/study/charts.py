@@ -139,7 +139,7 @@ def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, s
             markerfacecolor=it.colour if sure else "white", linestyle="none",
         )  # fmt: skip
     _rows(ax, [outcome_look(name).label for name in found.names])
-    reach = 1.12 * float(max(np.abs(found.low).max(), np.abs(found.high).max()))
+    reach = 1.12 * float(max(np.abs(found.low).max(), np.abs(found.high).max())) or 1.0  # nothing differs: any range
     ax.set(xlabel=f"$P$({names[0]}) − $P$({names[1]})", xlim=(-reach, reach))
     return ax
 
@@ -174,14 +174,16 @@ def radius_curve(
     Raises
     ------
     ValueError
-        No such quantity or outcome.
+        No such quantity or outcome, or no finite radius to draw it at.
     """
     kinds = {"probability": "estimate", "difference": "difference", "slope": "slope"}
     if quantity not in kinds:
         raise ValueError(f"no quantity {quantity!r}; one of {', '.join(kinds)}")
+    finite = np.isfinite(curve.radii)
+    if finite.sum() < (2 if quantity == "slope" else 1):
+        raise ValueError("no finite radius to draw" if quantity != "slope" else "a slope needs two finite radii")
     ax = new_axes(ax, COLUMN, 2.4)
     whose = rf"\{'zeta' if curve.radius == 'visibility' else 'sigma'}_{{{symbol(curve.player)}}}"
-    finite = np.isfinite(curve.radii)
     values, part = curve.radii[finite], kinds[quantity]
     at = (values[1:] + values[:-1]) / 2.0 if quantity == "slope" else values
     low_name, high_name = ("low", "high") if part == "estimate" else (f"{part}_low", f"{part}_high")
@@ -209,7 +211,9 @@ def radius_curve(
         "difference": f"$P - P(\\mathrm{{{'reference'}}})$",
         "slope": rf"$\mathrm{{d}}P/\mathrm{{d}}{whose}$",
     }
-    ax.set(xlabel=f"${whose}$", ylabel=ylabel[quantity], xlim=(float(values[0]), float(values[-1])))
+    ax.set(xlabel=f"${whose}$", ylabel=ylabel[quantity])
+    if values[0] < values[-1]:
+        ax.set_xlim(float(values[0]), float(values[-1]))
     ax.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     label_ends(ax, ends)
     return ax
