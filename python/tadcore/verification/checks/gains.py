@@ -26,10 +26,10 @@ from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_c
 from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
-from tadcore.verification.oracle.optimality import optimality
+from tadcore.verification.oracle.optimality import CRITICAL, optimality
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
-_GRADIENT, _CURVATURE, _LOWER, _BELOW = 1e-9, 1e-9, 1e-8, 1e-10
+_CURVATURE, _LOWER, _BELOW = 1e-9, 1e-8, 1e-10
 _DENSE = 400
 
 
@@ -109,7 +109,7 @@ def check_gains(
     steepest = float(slopes[at])
     remedy = "the gains are not critical points of Θ: they are not what the synthesis gives"
     where = f"t = {run.times[at]:.6g}"
-    checks.append(Check("gains.gradient", steepest, _GRADIENT, True, remedy, "eq:errgradient", where))
+    checks.append(Check("gains.gradient", steepest, CRITICAL, True, remedy, "eq:errgradient", where))
 
     chosen = _instants(run, instants)
     flattest, lower, worst, where_lower = np.inf, 0.0, 0.0, 0
