@@ -335,6 +335,9 @@ def best_start(
     fresh_seed = (study.seed + 1) % 2**64 if seed is None else as_index("seed", seed, 2**64 - 1)
     if fresh_seed == study.seed:
         raise ScenarioError("seed", seed, "another than the study's own: the fresh trials must be new")
+    again = study.replace(seed=fresh_seed)
+    for one in (study, again):
+        one.check(progress=progress)
     games = Placed(study, player, threads)
     which = outcome_names(games.sc.n).index(as_outcome(outcome, games.sc.n))
     bounds = _bounds(games.sc, x, y, z)
@@ -350,7 +353,7 @@ def best_start(
     found = direct(loss, bounds, maxfun=most, maxiter=most, vol_tol=0.0, len_tol=0.0)
     for _ in steps:
         pass
-    fresh = Placed(study.replace(seed=fresh_seed), player, threads)
+    fresh = Placed(again, player, threads)
     events = fresh.events(np.array([found.x, fresh.own]))[which]
     hits, own = int(events[0].sum()), int(events[1].sum())
     low, high = proportion_interval(hits, fresh.trials, level=confidence, method="exact")

@@ -171,7 +171,8 @@ def sweep(
     Raises
     ------
     ScenarioError
-        A path leads nowhere, or a value breaks a rule of scenarios; every cell is checked before any runs.
+        A path leads nowhere, or a value breaks a rule of scenarios; every cell and all its draws are checked before any
+        runs.
 
     Examples
     --------
@@ -186,6 +187,12 @@ def sweep(
     axes = _axes(study, grid)
     points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
     studies = [_cell_study(study, point) for point in points]
+    for point, one in zip(points, studies, strict=True):
+        try:
+            one.check(progress=progress)
+        except ScenarioError as error:
+            error.add_note(f"(in the cell {', '.join(f'{path} = {value!r}' for path, value in point.items())})")
+            raise
     cells = []
     for number, (point, one) in enumerate(zip(points, studies, strict=True), start=1):
         folder = None if store is None else Path(store) / _folder(point)

@@ -172,6 +172,21 @@ class Study:
         drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
         return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
 
+    def check(self, *, progress: bool = False) -> None:
+        """Draw every trial without playing, as `run` does before anything else; a million take 0.1 s.
+
+        Parameters
+        ----------
+        progress : bool
+            Show a bar in a terminal or a notebook.
+
+        Raises
+        ------
+        ScenarioError
+            A draw is no game: the path, the trial and the value are named.
+        """
+        self._plan.check_ahead(self.trials, progress=progress)
+
     def replace(self, **changes: Any) -> Study:
         """Another study with some of ``sc``, ``vary``, ``trials``, ``seed`` and ``design`` changed."""
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
@@ -256,7 +271,7 @@ class Study:
             raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
         folder = None if store is None else as_path("store", store)
         kept_table = None if table is None else as_path("table", table)
-        self._plan.check_ahead(self.trials, progress=bool(progress))
+        self.check(progress=bool(progress))
         game_of(self.scenario).equilibrium()
         opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), self._plan)
         with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:

@@ -107,3 +107,13 @@ def test_a_grid_that_cannot_be_swept_is_refused_before_any_cell_runs(grid, words
     monkeypatch.setattr(Study, "run", lambda *_, **__: pytest.fail("a cell was run"))
     with pytest.raises(ScenarioError, match=words):
         sweep(study(10), grid)
+
+
+def test_the_draws_of_every_cell_are_checked_before_any_runs(monkeypatch, tmp_path):
+    base = study(3 * CHUNK, vary={"d1.visibility_radius": Box(0.5, 4.0)})
+    smallest = float(base.inputs()["defenders.0.visibility_radius"].min())
+    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    with pytest.raises(ScenarioError, match=rf"trial [\d,]+: got .* capture radius, {smallest!r}") as caught:
+        sweep(base, {"d1.capture_radius": [0.1, 0.2, smallest]}, store=tmp_path / "store")
+    assert caught.value.__notes__ == [f"(in the cell defenders.0.capture_radius = {smallest!r})"]
+    assert not (tmp_path / "store").exists()
