@@ -35,12 +35,12 @@ fn synthesis(c: &mut Criterion) {
     for n in [3, 5, 10, 20] {
         let game = bank::varied_game(Interaction::I1, n, 3.0, 0.01).expect("a valid game");
         let policy = Policy::new(game, DEFAULT_TABLE_BYTES, &CancelToken::new()).expect("an equilibrium");
-        let problem = policy.problem(150);
+        let problem = policy.problem(150, &CancelToken::new()).expect("memory");
         let all = networks(problem.rows(), problem.size());
         let mut solver = Synthesizer::new();
         let options = Options::default();
         let certified: Vec<Topology> =
-            all.iter().filter(|t| solver.solve(&problem, t, options).certified).cloned().collect();
+            all.iter().filter(|t| solver.solve(&problem, t, options).expect("memory").certified).cloned().collect();
         let mut group = c.benchmark_group("synthesis");
         if n >= 10 {
             group.sample_size(10);
@@ -51,7 +51,7 @@ fn synthesis(c: &mut Criterion) {
             }
             let mut turn = set.iter().cycle();
             group.bench_function(format!("{kind}/{n}"), |b| {
-                b.iter(|| turn.next().map(|t| black_box(solver.solve(&problem, t, options))));
+                b.iter(|| turn.next().map(|t| black_box(solver.solve(&problem, t, options).expect("memory"))));
             });
         }
         group.finish();

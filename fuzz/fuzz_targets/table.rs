@@ -38,7 +38,7 @@ fn play(policy: &Policy, n: usize) -> Vec<u8> {
     let batch = Batch { dim: 2, positions: &positions, visibility: &visibility, capture: &capture };
     // A table that was tampered with gives other numbers, and may drive a player beyond all bounds: that is an error.
     let _ = ensemble::run(policy, &batch, Some(1), &CancelToken::new());
-    policy.save_transitions()
+    policy.save_transitions(&CancelToken::new()).expect("memory")
 }
 
 /// A per-step table by index, one by hashing and one of keys of two words.
@@ -75,7 +75,7 @@ fuzz_target!(|input: Input| {
         sealed(table)
     };
     let policy = policy(&known.game);
-    if policy.load_transitions(&bytes).is_ok() {
+    if policy.load_transitions(&bytes, &CancelToken::new()).is_ok() {
         play(&policy, known.game.n());
     }
 });

@@ -5,7 +5,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "grid_times", "simd"]
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "grid_times", "observe", "simd"]
 
 __version__: str
 
@@ -77,8 +77,6 @@ class Game:
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64]]: ...
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
-    def table_length(self, start: bytes) -> int:
-        """Bytes of the saved table that begins with these (40 at least); ValueError where it is not this game's."""
     def load_table(self, table: bytes) -> int:
         """Add the entries of a saved table; ValueError for one that is not this game's. The entries held now."""
     def table(self) -> dict[str, int]: ...
@@ -171,3 +169,6 @@ class Record:
     @property
     def certified(self) -> int: ...
     """Rows whose gains are proved to be globally optimal."""
+
+def observe(positions: NDArray[np.float64], visibility_radii: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Who sees whom at positions (n + 2, dim): 𝒜, shape (m, N), as a run sees it."""

@@ -17,6 +17,7 @@ __all__ = [
     "MISSING",
     "Missing",
     "NoEquilibriumError",
+    "OutOfMemoryError",
     "ScenarioError",
     "StoreError",
     "TadcoreError",
@@ -150,6 +151,35 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.escape_time, self.horizon, self.step)
+
+
+class OutOfMemoryError(TadcoreError, MemoryError):
+    """Memory that the system would not give, or more than one purpose may take; refused before it is used.
+
+    Parameters
+    ----------
+    what : str
+        What asked for it, such as ``"the record of one run"``.
+    size : int
+        Bytes asked for.
+    limit : int or None
+        The limit that they exceed; None where the system refused.
+    """
+
+    def __init__(self, what: str, size: int, limit: int | None = None) -> None:
+        super().__init__(what, size, limit)
+        self.what = what
+        self.size = size
+        self.limit = limit
+
+    def __str__(self) -> str:
+        asked = f"{self.what}: {self.size:,} bytes ({self.size / 2**30:.1f} GiB)"
+        if self.limit is None:
+            return f"{asked}, which the system would not give; {_SMALLER}"
+        return f"{asked}, more than the limit of {self.limit / 2**30:.1f} GiB; {_SMALLER}"
+
+
+_SMALLER = "fewer defenders, steps or games need less, and so do players that see few others, or all"
 
 
 class StoreError(TadcoreError, RuntimeError):

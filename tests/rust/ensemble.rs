@@ -173,7 +173,7 @@ fn equal_defenders_share_their_answers() {
 
 /// The entries of a saved table in order, without the checksum.
 fn sorted(policy: &Policy) -> Vec<Vec<u8>> {
-    let bytes = policy.save_transitions();
+    let bytes = policy.save_transitions(&CancelToken::new()).expect("memory");
     let words = (policy.game().constrained() * policy.game().size()).div_ceil(64);
     let len = 8 * (1 + words + policy.game().size().pow(2));
     // Behind the header and the game's identity, of which the header says how long it is.
@@ -197,12 +197,13 @@ fn relabelled_networks_have_relabelled_gains() {
             let density = draws.next();
             let seen: Vec<bool> = (0..m * n).map(|_| draws.next() < density).collect();
             let topology = Topology::from_fn(m, n, |i, j| seen[i * n + j]);
-            let own = policy.solve(2, &topology, &mut solver);
+            let own = policy.solve(2, &topology, &mut solver, &CancelToken::new()).expect("memory");
             let orders = [[1, 0, 2, 3, 4], [3, 1, 2, 0, 4], [0, 3, 2, 1, 4], [1, 3, 2, 0, 4], [3, 0, 2, 1, 4]];
             let symmetric = orders.iter().any(|order| topology.relabelled(order) == topology);
             for order in orders.iter().filter(|_| !symmetric) {
                 compared += 1;
-                let other = policy.solve(2, &topology.relabelled(order), &mut solver);
+                let other =
+                    policy.solve(2, &topology.relabelled(order), &mut solver, &CancelToken::new()).expect("memory");
                 for (i, row) in other.transition.chunks_exact(n).enumerate() {
                     assert!((0..n).all(|j| row[j] == own.transition[order[i] * n + order[j]]));
                 }
@@ -211,7 +212,8 @@ fn relabelled_networks_have_relabelled_gains() {
                 }
                 assert!((0..n).all(|j| other.attacker[j] == own.attacker[order[j]]));
             }
-            let alone = solver.solve(&policy.problem(2), &topology, Options::default());
+            let problem = policy.problem(2, &CancelToken::new()).expect("memory");
+            let alone = solver.solve(&problem, &topology, Options::default()).expect("memory");
             assert!((alone.theta - own.gains.theta).abs() <= 1e-9 * alone.theta + 1e-20, "{topology:?}");
             for (a, b) in alone.rows.iter().zip(&own.gains.rows) {
                 assert!((a - b).abs() < 1e-7, "{topology:?}");
@@ -239,24 +241,20 @@ fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
     for n in [2, 3, 4] {
         let first = make(Interaction::I1, n);
         let ends = first.play(1);
-        let bytes = first.policy.save_transitions();
+        let bytes = first.policy.save_transitions(&CancelToken::new()).expect("memory");
 
         let second = make(Interaction::I1, n);
-        assert_eq!(second.policy.load_transitions(&bytes), Ok(first.policy.table().entries));
-        assert_eq!(second.policy.save_transitions(), bytes);
+        assert_eq!(second.policy.load_transitions(&bytes, &CancelToken::new()), Ok(first.policy.table().entries));
+        assert_eq!(second.policy.save_transitions(&CancelToken::new()).expect("memory"), bytes);
         assert_eq!(second.play(1), ends);
         assert_eq!(second.policy.table().misses, 0);
 
-        let load = |bytes: &[u8]| second.policy.load_transitions(bytes);
-        // Its first bytes say how long it is, so that nothing longer need be read.
-        assert_eq!(second.policy.transitions_length(&bytes[..40]), Ok(bytes.len() as u64));
-        let mut vast = bytes.clone();
-        vast[32..40].copy_from_slice(&u64::MAX.to_le_bytes());
-        assert!(matches!(load(&vast), Err(TableError::TooMany { found: u64::MAX, .. })));
-        let small = case(Interaction::I1, n, 2, 40, true, 1000);
-        assert!(matches!(small.policy.transitions_length(&bytes[..40]), Err(TableError::TooMany { .. })));
+        let load = |bytes: &[u8]| second.policy.load_transitions(bytes, &CancelToken::new());
         assert_eq!(load(&[]), Err(TableError::Foreign));
-        assert_eq!(make(Interaction::I2, n).policy.load_transitions(&bytes), Err(TableError::OtherGame));
+        assert_eq!(
+            make(Interaction::I2, n).policy.load_transitions(&bytes, &CancelToken::new()),
+            Err(TableError::OtherGame)
+        );
         for at in [40, 57, bytes.len() / 2, bytes.len() - 1] {
             let mut damaged = bytes.clone();
             damaged[at] ^= 4;

@@ -89,7 +89,7 @@ fn of_games() -> Vec<Instant> {
             let (step, code) = (step.as_u64().expect("a step") as usize, code.as_u64().expect("a network"));
             found.push(Instant {
                 name: format!("{file}: {:?} n = {} step {step} network {code}", game.interaction(), game.n()),
-                problem: Problem::new(&game, equilibrium.node(step)),
+                problem: Problem::new(&game, equilibrium.node(step), &CancelToken::new()).expect("memory"),
                 p: equilibrium.node(step).to_vec(),
                 topology: network(&game, code),
                 theta: number(theta),
@@ -121,7 +121,14 @@ fn published() -> Vec<Instant> {
         Instant {
             name: format!("synthesis_hard: {index}"),
             topology: Topology::from_fn(r.len(), r.len(), |i, j| rows[i][j] == 1.0),
-            problem: Problem::from_parts(interaction(&case["interaction"]), r, numbers(&case["gamma"]), &p),
+            problem: Problem::from_parts(
+                interaction(&case["interaction"]),
+                r,
+                numbers(&case["gamma"]),
+                &p,
+                &CancelToken::new(),
+            )
+            .expect("memory"),
             p,
             theta: number(&case["best_theta"]),
         }
@@ -132,7 +139,7 @@ fn published() -> Vec<Instant> {
 /// What a search gives for each instant.
 fn solved(instants: &[Instant]) -> Vec<Gains> {
     let mut solver = Synthesizer::new();
-    instants.iter().map(|i| solver.solve(&i.problem, &i.topology, Options::default())).collect()
+    instants.iter().map(|i| solver.solve(&i.problem, &i.topology, Options::default()).expect("memory")).collect()
 }
 
 #[test]
@@ -165,7 +172,9 @@ fn gains_use_what_the_network_shows() {
                 assert!(row.iter().sum::<f64>().abs() <= 1e-14 * size, "{}: {i}", instant.name);
             }
         }
-        let theta = instant.problem.weigh(&instant.problem.terms(&instant.p, &found.rows));
+        let theta = instant
+            .problem
+            .weigh(&instant.problem.terms(&instant.p, &found.rows, &CancelToken::new()).expect("memory"));
         assert!((theta - found.theta).abs() <= 1e-11 * theta, "{}: {theta}", instant.name);
     }
 }

@@ -5,12 +5,27 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; `cost` stands beside `simulation` and reads its records.
-const LAYERS: [&str; 11] =
-    ["error", "cancel", "simd", "game", "riccati", "network", "synthesis", "policy", "simulation", "cost", "ensemble"];
+const LAYERS: [&str; 12] = [
+    "error",
+    "cancel",
+    "memory",
+    "simd",
+    "game",
+    "riccati",
+    "network",
+    "synthesis",
+    "policy",
+    "simulation",
+    "cost",
+    "ensemble",
+];
 
 /// The modules of the synthesis from the ground up, and the layers that each may use.
-const SYNTHESIS: [(&str, &[&str]); 3] =
-    [("newton", &["simd"]), ("theta", &["simd", "game"]), ("search", &["simd", "game", "network"])];
+const SYNTHESIS: [(&str, &[&str]); 3] = [
+    ("newton", &["error", "cancel", "memory", "simd"]),
+    ("theta", &["error", "cancel", "memory", "simd", "game"]),
+    ("search", &["error", "cancel", "memory", "simd", "game", "network"]),
+];
 
 /// Every source of the core, with its path from the root of its crate: the kernels, a crate of their own, have modules
 /// of the same names.

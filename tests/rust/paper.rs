@@ -77,7 +77,10 @@ fn a_run_solves_each_step_once_and_a_second_run_solves_nothing() {
     let second = run(&policy, &bank::paper_i1_limited());
     assert_eq!(policy.table().misses, 280);
     assert_eq!(first, second);
-    assert_eq!(cost::costs(&policy, &first), cost::costs(&policy, &second));
+    assert_eq!(
+        cost::costs(&policy, &first, &CancelToken::new()).expect("not cancelled"),
+        cost::costs(&policy, &second, &CancelToken::new()).expect("not cancelled")
+    );
 }
 
 /// With everyone in sight the zero-sum value is ½ z(0)ᵀP(0)z(0), and J of I1 is ½ z(0)ᵀP_p(0)z(0), when the game runs
@@ -97,8 +100,10 @@ fn costs_are_the_value_functions_when_everyone_sees_everyone() {
         assert_eq!(record.outcome, Outcome::Timeout);
         let mut z = Vec::new();
         tadcore::simulation::relative_state(&start.positions.concat(), 2, &mut z);
-        for (j, p) in
-            cost::costs(&policy, &record).expect("costs").into_iter().zip(policy.equilibrium().node(0).chunks_exact(9))
+        for (j, p) in cost::costs(&policy, &record, &CancelToken::new())
+            .expect("costs")
+            .into_iter()
+            .zip(policy.equilibrium().node(0).chunks_exact(9))
         {
             let value: f64 =
                 (0..9).map(|e| p[e] * (0..2).map(|x| z[e / 3 * 2 + x] * z[e % 3 * 2 + x]).sum::<f64>()).sum();
@@ -281,7 +286,7 @@ fn costs_are_the_integrals_over_the_recorded_states() {
         let policy = paper(interaction, 1.0);
         let record = run(&policy, &start);
         let (computed, expected) =
-            (cost::costs(&policy, &record).expect("costs"), costs_by_trapezoids(&policy, &record));
+            (cost::costs(&policy, &record, &CancelToken::new()).expect("costs"), costs_by_trapezoids(&policy, &record));
         assert_eq!(computed.len(), expected.len());
         for (a, b) in computed.iter().zip(&expected) {
             assert!((a - b).abs() < 1e-8 * b.abs().max(1.0), "{interaction:?}: {a} and {b}");

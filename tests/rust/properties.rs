@@ -87,7 +87,7 @@ proptest! {
         for values in [&record.positions, &record.controls, &record.gains, &record.theta, &record.terms] {
             prop_assert!(values.iter().all(|x| x.is_finite()));
         }
-        prop_assert!(costs(&policy, &record).expect("costs").iter().all(|j| j.is_finite()));
+        prop_assert!(costs(&policy, &record, &CancelToken::new()).expect("costs").iter().all(|j| j.is_finite()));
         prop_assert!(record.theta.iter().all(|&theta| theta >= 0.0));
     }
 
@@ -133,7 +133,7 @@ proptest! {
         let Some(policy) = drawn.policy() else { return Ok(()) };
         let (m, n) = (drawn.game.constrained(), drawn.game.size());
         let network = Topology::from_fn(m, n, |i, j| seed[i * n + j] && i % 3 != 2);
-        let gains = policy.solve(0, &network, &mut Synthesizer::new()).gains;
+        let gains = policy.solve(0, &network, &mut Synthesizer::new(), &CancelToken::new()).expect("memory").gains;
         prop_assert!(gains.theta.is_finite() && gains.theta >= 0.0);
         for (i, row) in gains.rows.chunks_exact(n).enumerate() {
             let blind = (0..n).all(|j| !network.sees(i, j));
@@ -154,7 +154,7 @@ proptest! {
     fn full_sight_is_the_equilibrium(drawn in drawn(8)) {
         let Some(policy) = drawn.policy() else { return Ok(()) };
         let (m, n) = (drawn.game.constrained(), drawn.game.size());
-        let gains = policy.solve(0, &Topology::complete(m, n), &mut Synthesizer::new()).gains;
+        let gains = policy.solve(0, &Topology::complete(m, n), &mut Synthesizer::new(), &CancelToken::new()).expect("memory").gains;
         let mut feedback = vec![0.0; (n + 1) * n];
         policy.equilibrium().feedback(policy.game(), 0, &mut feedback);
         let largest = feedback.iter().fold(1.0, |most: f64, g| most.max(g.abs()));
@@ -204,12 +204,12 @@ proptest! {
     fn a_table_of_any_bytes_is_refused(drawn in drawn(3), at in any::<prop::sample::Index>(), bytes in prop::collection::vec(any::<u8>(), 1..40)) {
         let Some(policy) = drawn.policy() else { return Ok(()) };
         drawn.run(&policy);
-        let mut table = policy.save_transitions();
+        let mut table = policy.save_transitions(&CancelToken::new()).expect("memory");
         let from = at.index(table.len());
         let whole = table.clone();
         table.splice(from..(from + bytes.len()).min(whole.len()), bytes);
         if table != whole {
-            prop_assert!(policy.load_transitions(&table).is_err());
+            prop_assert!(policy.load_transitions(&table, &CancelToken::new()).is_err());
         }
     }
 }

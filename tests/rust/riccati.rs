@@ -365,14 +365,17 @@ fn residuals_are_small_and_see_another_game() -> Fallible {
         for steps in [1, 5, 60, 1200] {
             let game = bank::varied_game(interaction, n, 6.0, 6.0 / steps as f64)?;
             let solved = run(&game)?;
-            let residual = solved.residual(&game);
+            let residual = solved.residual(&game, &CancelToken::new()).expect("memory");
             assert_eq!(residual.len(), solved.groups() * (steps + 1));
             let worst = residual.iter().copied().fold(0.0, f64::max);
             assert!(worst < 1e-9, "{interaction:?}, n = {n}, {steps} steps: {worst:.1e}");
             let mut w = game.weights().clone();
             w.q_ad[0] *= 1.01;
             let other = Game::new(interaction, w, *game.grid())?;
-            assert!(solved.residual(&other).iter().copied().fold(0.0, f64::max) > 1e-5);
+            assert!(
+                solved.residual(&other, &CancelToken::new()).expect("memory").iter().copied().fold(0.0, f64::max)
+                    > 1e-5
+            );
         }
     }
     Ok(())
@@ -407,7 +410,12 @@ fn weights_over_twelve_orders_are_solved_or_refused() -> Fallible {
                     Ok(solved) => {
                         solved_games += 1;
                         assert!(solved.as_slice().iter().all(|v| v.is_finite()));
-                        let worst = solved.residual(&game).iter().copied().fold(0.0, f64::max);
+                        let worst = solved
+                            .residual(&game, &CancelToken::new())
+                            .expect("memory")
+                            .iter()
+                            .copied()
+                            .fold(0.0, f64::max);
                         assert!(worst < 1e-4, "{interaction:?} ({i}, {j}): {worst:.1e}");
                     }
                     Err(EquilibriumError::FiniteEscape { escape_time, horizon }) => {

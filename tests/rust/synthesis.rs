@@ -32,13 +32,13 @@ impl Instant {
     fn new(interaction: Interaction, n: usize) -> Self {
         let game = bank::varied_game(interaction, n, 0.2, 0.1).expect("a valid game");
         let equilibrium = riccati::solve(&game, &CancelToken::new()).expect("an equilibrium");
-        let problem = Problem::new(&game, equilibrium.node(0));
+        let problem = Problem::new(&game, equilibrium.node(0), &CancelToken::new()).expect("memory");
         Self { game, equilibrium, problem }
     }
 
     /// Θ by its terms, each a sum over the printed matrices.
     fn theta(&self, g: &[f64]) -> f64 {
-        self.problem.weigh(&self.problem.terms(self.equilibrium.node(0), g))
+        self.problem.weigh(&self.problem.terms(self.equilibrium.node(0), g, &CancelToken::new()).expect("memory"))
     }
 
     /// GᵀRG.
@@ -66,7 +66,7 @@ impl Instant {
     }
 
     fn solve(&self, topology: &Topology, options: Options) -> Gains {
-        Synthesizer::new().solve(&self.problem, topology, options)
+        Synthesizer::new().solve(&self.problem, topology, options).expect("memory")
     }
 }
 
@@ -155,7 +155,7 @@ fn a_certificate_is_a_lower_bound_that_is_convex() {
             let goal = instant.square(instant.problem.fne());
             let x = instant.square(&found.rows) - &goal;
             let bound = |g: &[f64]| {
-                let terms = instant.problem.terms(instant.equilibrium.node(0), g);
+                let terms = instant.problem.terms(instant.equilibrium.node(0), g, &CancelToken::new()).expect("memory");
                 let tangent = 2.0 * x.dot(&(instant.square(g) - &goal)) - x.norm_squared();
                 instant.problem.weigh(&terms) - gamma * terms[0] + gamma * tangent
             };
@@ -188,8 +188,10 @@ fn a_singular_certificate_proves_what_is_lowest() {
         let tau: Vec<f64> = (0..size * size).map(|e| v[e / size] * v[e % size]).collect();
         let p: Vec<f64> = [own, tau, vec![0.0; size * size]].concat();
         let r = numbers.vector(n).iter().map(|x| x.exp()).collect();
-        let problem = Problem::from_parts(Interaction::I1, r, vec![0.7, 0.4, 0.0, 0.0], &p);
-        let found = Synthesizer::new().solve(&problem, &Topology::complete(n, size), Options::default());
+        let problem =
+            Problem::from_parts(Interaction::I1, r, vec![0.7, 0.4, 0.0, 0.0], &p, &CancelToken::new()).expect("memory");
+        let found =
+            Synthesizer::new().solve(&problem, &Topology::complete(n, size), Options::default()).expect("memory");
         assert!(found.theta < 1e-24 && found.certified, "{n} {seed}: {}", found.theta);
     }
 }
@@ -220,11 +222,18 @@ fn what_is_reached_is_relative_and_says_why_it_ended() {
     for instant in instants() {
         let weights = instant.game.constrained_control_weights();
         let gamma = instant.game.weights().gamma.iter().map(|g| 1024.0 * g).collect();
-        let scaled = Problem::from_parts(instant.game.interaction(), weights, gamma, instant.equilibrium.node(0));
+        let scaled = Problem::from_parts(
+            instant.game.interaction(),
+            weights,
+            gamma,
+            instant.equilibrium.node(0),
+            &CancelToken::new(),
+        )
+        .expect("memory");
         let (mut stopped, options) = (0, Options { method: Method::Descent, max_iterations: 0 });
         for topology in networks(&instant, 12, 6) {
             let one = instant.solve(&topology, options);
-            let other = Synthesizer::new().solve(&scaled, &topology, options);
+            let other = Synthesizer::new().solve(&scaled, &topology, options).expect("memory");
             assert_eq!((one.gradient_norm, one.status), (other.gradient_norm, other.status), "{topology:?}");
             let stationary = one.gradient_norm <= 1e-10;
             assert_eq!(one.status, if stationary { Status::Converged } else { Status::IterationLimit }, "{topology:?}");
@@ -248,12 +257,14 @@ fn the_papers_descent_takes_no_step_that_does_not_pay() {
         // from the start, the fall of Θ to there; and the slope.
         let of = |share: f64| {
             let gamma = vec![1.0, share, 0.1, 0.1];
-            let problem = Problem::from_parts(Interaction::I1, vec![1.0], gamma, &symmetric);
+            let problem = Problem::from_parts(Interaction::I1, vec![1.0], gamma, &symmetric, &CancelToken::new())
+                .expect("memory");
             let after = |iterations| {
                 let options = Options { method: Method::Descent, max_iterations: iterations };
-                Synthesizer::new().solve(&problem, &topology, options).rows[0]
+                Synthesizer::new().solve(&problem, &topology, options).expect("memory").rows[0]
             };
-            let theta = |g: f64| problem.weigh(&problem.terms(&symmetric, &[g, 0.0]));
+            let theta =
+                |g: f64| problem.weigh(&problem.terms(&symmetric, &[g, 0.0], &CancelToken::new()).expect("memory"));
             let (g, next) = (after(0), after(1));
             let slope = (theta(g + 1e-5) - theta(g - 1e-5)) / 2e-5;
             let trial = -0.1 * g.abs() * slope.signum();

@@ -10,6 +10,13 @@ from typing import Any
 LIGHTEST, HEAVIEST, FARTHEST = 1e-30, 1e30, 1e100
 """Bounds of weights and of coordinates, far beyond any game: within them the numbers of a game stay finite."""
 
+FINEST = 1e-12
+"""The least visibility radius, relative to the largest distance from the attacker along an axis.
+
+States are relative to the attacker and rounded by a 1e-16th of that distance: of players much farther from it than from
+one another it could not be told who sees whom.
+"""
+
 MOST_DEFENDERS = 1000
 """Far beyond what can be played; P of so many players fits into memory on the shortest grids only."""
 
@@ -31,6 +38,16 @@ FRACTION = Rule("a number in [0, 1]", lambda v: (v >= 0.0) & (v <= 1.0))
 
 OF_FIELD = {"position": (FINITE, COORDINATE), "visibility_radius": (RADIUS,), "capture_radius": (POSITIVE,)}
 """The rules of what may vary within one game."""
+
+
+def can_be_told(sight: Any, extent: Any) -> Any:
+    """Whether rounding does not decide who is seen; ``extent``: the largest distance from the attacker on an axis."""
+    return sight >= FINEST * extent
+
+
+def too_far(extent: float) -> str:
+    """What a visibility radius must be for `can_be_told`."""
+    return f"at least {FINEST:g} of the largest distance from the attacker along an axis ({extent:g}), or inf"
 
 
 def sees_whom_it_intercepts(capture: Any, sight: Any) -> Any:

@@ -18,7 +18,7 @@ from tadcore.errors import ScenarioError, StoreError, TadcoreError
 
 from .explore import explore
 from .maps import draw_map, write_report
-from .options import FAILED, set_backend_aside
+from .options import FAILED
 from .paper import reproduce
 from .runs import scenarios, simulate, validate
 from .study import study
@@ -85,8 +85,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its answer
-    if arguments is None:
-        set_backend_aside()
     try:
         app(args=None if arguments is None else list(arguments), prog_name="tadcore")
     except ScenarioError as error:
@@ -97,6 +95,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(_BAD_INPUT)
     except TadcoreError as error:
         complain(str(error))
+        sys.exit(FAILED)
+    except MemoryError as error:
+        complain(f"there is no memory for this: {error}" if str(error) else "there is no memory for this")
         sys.exit(FAILED)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""

@@ -21,16 +21,15 @@ This is for looking at one instant; runs use the compiled core.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import as_adjacency, as_index, as_positions, shape_of
+from tadcore import _core
+from tadcore._shared.arrays import as_adjacency, as_positions, shape_of
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
-
-from .compiled import as_scenario
 
 Edge: TypeAlias = tuple[str, str]
 """Who sees whom, such as ``("d1", "attacker")``."""
@@ -72,15 +71,12 @@ class VisibilityNetwork:
 
     @classmethod
     def from_positions(cls, sc: Scenario, positions: ArrayLike | None = None) -> VisibilityNetwork:
-        """The network of players at ``positions``, shape (n + 2, dim); the scenario's own start by default."""
-        as_scenario(sc)
+        """The network of players at ``positions``, shape (n + 2, dim); the scenario's own start by default.
+
+        The compiled core decides, by the arithmetic of a run: from states relative to the attacker, in doubles.
+        """
         at = sc.positions if positions is None else as_positions(positions, (sc.n + 2, sc.dim))
-        m, size = len(sc.constrained), sc.n + 1
-        distance = np.linalg.norm(at[:m, None, :] - at[None, :, :], axis=-1)
-        sees = distance <= sc.visibility_radii[:, None]
-        adjacency = sees[:, :size].copy()
-        adjacency[np.arange(m), np.arange(m)] = sees[:, size]
-        return cls(adjacency)
+        return cls(_core.observe(at, sc.visibility_radii))
 
     @property
     def n(self) -> int:
@@ -131,8 +127,7 @@ class VisibilityNetwork:
         relative = np.eye(size, dtype=np.int_)
         relative[:, i] = -1
         relative[i, i] = 1
-        axes = np.eye(as_index("dim", dim, 100, least=1), dtype=np.int_)
-        return np.kron(self.adjacency[i].astype(np.int_)[:, None] * relative, axes)
+        return np.kron(self.adjacency[i].astype(np.int_)[:, None] * relative, np.eye(dim, dtype=np.int_))
 
     @property
     def information_matrix_team(self) -> NDArray[np.int_]:
@@ -153,9 +148,6 @@ class VisibilityNetwork:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, VisibilityNetwork) and np.array_equal(self.adjacency, other.adjacency)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.adjacency,)
 
     def __hash__(self) -> int:
         return hash((self.adjacency.shape, self.adjacency.tobytes()))

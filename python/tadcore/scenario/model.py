@@ -32,12 +32,11 @@ import tomli_w
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tadcore._shared.arrays import Floats
-from tadcore._shared.files import as_path, write_whole
-from tadcore._shared.limits import MOST_DEFENDERS, sees_whom_it_intercepts
-from tadcore._shared.toml import parse_toml, read_text
+from tadcore._shared.files import parse_toml, read_text, write_whole
+from tadcore._shared.limits import MOST_DEFENDERS, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore.errors import ScenarioError
 
-from .checked import NO_FIELD, CheckedModel
+from .checked import CheckedModel
 from .fields import (
     Fraction,
     Gamma,
@@ -49,7 +48,6 @@ from .fields import (
     is_team,
     refusal,
 )
-from .hints import hint, wildcards
 from .paths import beyond, expand
 
 _MOST_STEPS = 10_000_000
@@ -178,7 +176,16 @@ class Scenario(CheckedModel):
             if not sees_whom_it_intercepts(d.capture_radius, d.visibility_radius):
                 rule = f"larger than the capture radius ({d.capture_radius!r})"
                 problems.append((("defenders", i, "visibility_radius"), d.visibility_radius, rule))
-        return problems
+        return problems or self._range_problems()
+
+    def _range_problems(self) -> list[Problem]:
+        extent = float(np.abs(self.positions - self.positions[-1]).max())
+        seers = self._parts()[2:] + self._parts()[1:2] * (self.interaction == "I2")
+        return [
+            ((*where, "visibility_radius"), radius, too_far(extent))
+            for (where, _), radius in zip(seers, self.visibility_radii.tolist(), strict=True)
+            if not can_be_told(radius, extent)
+        ]
 
     def _parts(self) -> list[tuple[tuple[str | int, ...], Attacker | Target | Defender]]:
         team = [(("defenders", i), d) for i, d in enumerate(self.defenders)]
@@ -251,7 +258,7 @@ class Scenario(CheckedModel):
         # Arrays here hold a few numbers: they read better on one line.
         text = _ARRAY.sub(lambda lines: f"[{' '.join(lines[1].split())[:-1]}]", tomli_w.dumps(self.model_dump()))
         if path is not None:
-            write_whole(as_path("path", path), text)
+            write_whole(path, text)
         return text
 
     def describe(self) -> str:
@@ -295,13 +302,8 @@ class Scenario(CheckedModel):
         if missing := beyond(self.n, path):
             raise ScenarioError(path, value, missing)
         if not names:
-            rule = "the path of a field that some player of this game has"
-            raise ScenarioError(path, value, self._rule_of(path, rule))
+            raise ScenarioError(path, value, "the path of a field that some player of this game has")
         return names
-
-    def _rule_of(self, path: str, rule: str = NO_FIELD) -> str:
-        nearest = hint(path, wildcards(self.paths))
-        return f"{rule}{nearest and f'; {nearest}'}"
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         data = self.model_dump()

@@ -111,7 +111,7 @@ def simulate_batch(
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
     sight = visibility_rows(sc, visibility_radii, len(starts))
     capture = capture_rows(sc, capture_radii, len(starts))
-    compare(capture, sight, sc.n)
+    compare(starts, capture, sight, sc.n)
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
     kind, defender, time = game_of(sc).simulate_batch(starts, sight, capture, threads=workers)
     return Batch(kind, defender, time)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, as_real, refuse_where
-from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
+from tadcore._shared.limits import OF_FIELD, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
@@ -42,8 +42,20 @@ def _rows(name: str, given: Floats, games: int, columns: int, meaning: str, fiel
     return np.ascontiguousarray(np.atleast_2d(given))
 
 
-def compare(capture: Floats, sight: Floats, n: int) -> None:
-    """Whoever intercepts sees the attacker: σ < ζ for every defender."""
+def compare(starts: Floats, capture: Floats, sight: Floats, n: int) -> None:
+    """Whoever intercepts sees the attacker, σ < ζ; and rounding does not decide who is seen."""
     bad = ~sees_whom_it_intercepts(capture[:, :n], sight[:, :n])
     shown = np.broadcast_to(sight[:, :n], bad.shape)
     refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")
+    extents = extents_of(starts)
+    bad = ~can_be_told(sight, extents[:, None])
+    refuse_where("visibility_radii", np.broadcast_to(sight, bad.shape), bad, too_far(float(extents.max(initial=0.0))))
+
+
+def extents_of(starts: Floats) -> Floats:
+    """The largest distance from the attacker along an axis, of each game."""
+    if not starts.size:
+        return np.zeros(len(starts))
+    low, high = starts.min(axis=1), starts.max(axis=1)
+    attacker = starts[:, -1]
+    return np.asarray(np.maximum(high - attacker, attacker - low).max(axis=1), dtype=np.float64)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore._shared.limits import OF_FIELD, sees_whom_it_intercepts
+from tadcore._shared.limits import OF_FIELD, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.sampling.base import Block, Sampler
@@ -19,6 +19,7 @@ from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
+from tadcore.simulation.rules import extents_of
 
 from .vary import quantities
 
@@ -76,12 +77,17 @@ class Plan:
         for values, (name, field) in zip(inputs.T, fields, strict=True):
             for rule in OF_FIELD[field]:
                 self._refuse(chunk, name, values, ~rule.holds(values), rule.words)
-        _, sight, capture = setups(self.scenario, self.quantities, inputs)
+        positions, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
             reach, seen = (np.broadcast_to(radii[..., i], len(inputs)) for radii in (capture, sight))
             bad = ~sees_whom_it_intercepts(reach, seen)
             words = f"larger than the defender's capture radius, {float(reach[int(bad.argmax())])!r}"
             self._refuse(chunk, f"defenders.{i}.visibility_radius", seen, bad, words)
+        extents = extents_of(positions)
+        for i, (where, seen) in enumerate(zip(self.scenario.constrained, np.atleast_2d(sight).T, strict=True)):
+            bad = ~can_be_told(seen, extents)
+            path = f"defenders.{i}.visibility_radius" if i < self.scenario.n else f"{where}.visibility_radius"
+            self._refuse(chunk, path, np.broadcast_to(seen, bad.shape), bad, too_far(float(extents[int(bad.argmax())])))
 
     def check_ahead(self, trials: int, *, progress: bool = False) -> None:
         """Check before anything runs that every trial is a game: a millisecond a chunk, one chunk in memory at a time.
@@ -97,11 +103,16 @@ class Plan:
         sc = self.scenario
         reach = {("visibility_radius", i): (float(r), float(r)) for i, r in enumerate(sc.visibility_radii)}
         reach |= {("capture_radius", i): (float(r), float(r)) for i, r in enumerate(sc.capture_radii)}
+        farthest = float(np.abs(sc.positions).max())
         for quantity, sampler in self.varied:
             ends = sampler.bounds()
+            if quantity.field == "position":
+                farthest = max(farthest, *map(abs, ends))
             if not all(rule.holds(end) for rule in OF_FIELD[quantity.field] for end in ends):
                 return False
             reach[quantity.field, quantity.row] = ends
+        if not all(can_be_told(reach["visibility_radius", i][0], 2.0 * farthest) for i in range(len(sc.constrained))):
+            return False
         pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
         return all(sees_whom_it_intercepts(capture[1], sight[0]) for capture, sight in pairs)
 

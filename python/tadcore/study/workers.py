@@ -46,13 +46,8 @@ def _submitted(plan: Plan, jobs: Sequence[Job], executor: Executor, threads: int
                 return
 
     try:
-        try:
-            with _told(plan):
-                submit()
-        except RuntimeError as error:
-            if "shutdown" not in str(error):
-                raise
-            raise ScenarioError("executor", executor, "open: this one has been shut down") from error
+        with _told(plan):
+            submit()
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             # What is whole comes first, so that it is kept when a worker has died beside it.

@@ -11,8 +11,10 @@
     reason = "not an interface: nothing is said or made that no one needs"
 )]
 
+pub mod cancel;
 pub mod ensemble;
 pub mod error;
+pub mod memory;
 pub mod policy;
 pub mod simd;
 pub mod synthesis;

@@ -6,8 +6,9 @@ use numpy::{PyArray2, PyArray3, PyArray4};
 use pyo3::prelude::*;
 use tadcore::policy::Policy;
 
-use super::arrays::shaped;
-use super::detach;
+use super::arrays::{filled, shaped};
+use super::guard::guarded;
+use super::{detach, errors};
 
 /// P on the grid: groups defenders, target, attacker in I1, team in I2.
 #[pyclass(frozen, module = "tadcore._core")]
@@ -40,15 +41,20 @@ impl Equilibrium {
     #[getter]
     #[allow(non_snake_case)]
     fn P<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<f64>>> {
-        let (solution, n) = (self.policy.equilibrium(), self.policy.game().size());
-        let groups = solution.groups();
-        let mut out = Vec::with_capacity(groups * self.nodes() * n * n);
-        for group in 0..groups {
-            for k in 0..self.nodes() {
-                out.extend_from_slice(&solution.node(k)[group * n * n..(group + 1) * n * n]);
-            }
-        }
-        shaped(py, &out, (groups, self.nodes(), n, n))
+        guarded(|| {
+            let (solution, n, nodes) = (self.policy.equilibrium(), self.policy.game().size(), self.nodes());
+            let len = n * n;
+            filled(py, (solution.groups(), nodes, n, n), |start, piece| {
+                let mut done = 0;
+                while done < piece.len() {
+                    let (matrix, from) = ((start + done) / len, (start + done) % len);
+                    let p = &solution.p(matrix / nodes, matrix % nodes)[from..];
+                    let count = p.len().min(piece.len() - done);
+                    piece[done..done + count].copy_from_slice(&p[..count]);
+                    done += count;
+                }
+            })
+        })
     }
 
     /// Accepted steps of the integrator.
@@ -59,18 +65,30 @@ impl Equilibrium {
 
     /// Relative Riccati residual at each node, shape (groups, K + 1).
     fn residual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let values = detach::interruptible(py, |_| self.policy.equilibrium().residual(self.policy.game()))?;
-        shaped(py, &values, (self.policy.equilibrium().groups(), self.nodes()))
+        guarded(|| {
+            let (solution, game) = (self.policy.equilibrium(), self.policy.game());
+            let values = detach::interruptible(py, |cancel| solution.residual(game, cancel))?
+                .map_err(|stopped| errors::stopped(py, stopped))?;
+            shaped(py, &values, (solution.groups(), self.nodes()))
+        })
     }
 
     /// FNE feedback rows d1…dn, target, attacker, shape (K + 1, N + 1, N): u = row @ z.
     fn feedback<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let n = self.policy.game().size();
-        let width = (n + 1) * n;
-        let mut out = vec![0.0; self.nodes() * width];
-        for (k, rows) in out.chunks_exact_mut(width).enumerate() {
-            self.policy.equilibrium().feedback(self.policy.game(), k, rows);
-        }
-        shaped(py, &out, (self.nodes(), n + 1, n))
+        guarded(|| {
+            let n = self.policy.game().size();
+            let mut rows = vec![0.0; (n + 1) * n];
+            let mut held = None;
+            filled(py, (self.nodes(), n + 1, n), |start, piece| {
+                for (e, x) in piece.iter_mut().enumerate() {
+                    let (k, at) = ((start + e) / rows.len(), (start + e) % rows.len());
+                    if held != Some(k) {
+                        self.policy.equilibrium().feedback(self.policy.game(), k, &mut rows);
+                        held = Some(k);
+                    }
+                    *x = rows[at];
+                }
+            })
+        })
     }
 }

@@ -6,6 +6,7 @@ use tadcore::network::Topology;
 use tadcore::synthesis::{Gains as CoreGains, Start, Status};
 
 use super::arrays::shaped;
+use super::guard::guarded;
 
 /// The gains at one (instant, topology).
 #[pyclass(frozen, module = "tadcore._core")]
@@ -26,14 +27,14 @@ impl Gains {
     /// Gain rows, shape (m, N): u_i = rows[i] @ z.
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        shaped(py, &self.gains.rows, (self.topology.rows(), self.topology.size()))
+        guarded(|| shaped(py, &self.gains.rows, (self.topology.rows(), self.topology.size())))
     }
 
     /// Scalar factors of the paper's K, shape (m, N).
     #[getter]
     #[allow(non_snake_case)]
     fn K<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        shaped(py, &self.gains.paper_gains(&self.topology), (self.topology.rows(), self.topology.size()))
+        guarded(|| shaped(py, &self.gains.paper_gains(&self.topology), (self.topology.rows(), self.topology.size())))
     }
 
     /// Θ, reduced.
@@ -44,8 +45,8 @@ impl Gains {
 
     /// Unweighted squared norms, in the order of the synthesis weights.
     #[getter]
-    fn terms<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.terms)
+    fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        guarded(|| shaped(py, &self.terms, self.terms.len()))
     }
 
     /// Relative norm of the gradient at the end.

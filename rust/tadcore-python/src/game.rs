@@ -1,22 +1,23 @@
 //! `Game`: weights and grid, and with them the equilibrium and the table that all its runs share.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use tadcore::cancel::CancelToken;
 use tadcore::ensemble::{self, Batch};
-use tadcore::error::EquilibriumError;
 use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{self, Setup};
 use tadcore::synthesis::{Method, Options, Synthesizer};
 
+use super::arrays::{copied, entries};
 use super::equilibrium::Equilibrium;
 use super::gains::Gains;
+use super::generation::Generation;
+use super::guard::guarded;
 use super::record::Record;
 use super::{detach, errors};
 
@@ -25,7 +26,7 @@ use super::{detach, errors};
 pub(crate) struct Game {
     game: CoreGame,
     table_bytes: usize,
-    policy: Mutex<Option<Arc<Policy>>>,
+    generation: Generation,
 }
 
 fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
@@ -35,18 +36,11 @@ fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
 impl Game {
     /// The policy, solving the equilibrium on first use. An error is found again, not kept: it is cheap to find.
     fn policy(&self, py: Python<'_>) -> PyResult<Arc<Policy>> {
-        detach::interruptible(py, |cancel| self.solved(cancel))?
-            .map_err(|error| errors::equilibrium(py, &self.game, &error))
-    }
-
-    fn solved(&self, cancel: &CancelToken) -> Result<Arc<Policy>, EquilibriumError> {
-        let mut held = self.policy.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(policy) = &*held {
-            return Ok(Arc::clone(policy));
+        if let Some(policy) = self.generation.solved() {
+            return Ok(policy);
         }
-        let policy = Arc::new(Policy::new(self.game.clone(), self.table_bytes, cancel)?);
-        *held = Some(Arc::clone(&policy));
-        Ok(policy)
+        detach::interruptible(py, |cancel| self.generation.solve(&self.game, self.table_bytes, cancel))?
+            .map_err(|error| errors::equilibrium(py, &self.game, &error))
     }
 }
 
@@ -80,30 +74,34 @@ impl Game {
         synthesis_weights: PyReadonlyArray1<'_, f64>,
         table_bytes: Option<usize>,
     ) -> PyResult<Self> {
-        let interaction = match interaction {
-            "I1" => Interaction::I1,
-            "I2" => Interaction::I2,
-            other => return Err(PyValueError::new_err(format!("interaction is {other:?}, but it must be I1 or I2"))),
-        };
-        let weights = Weights {
-            r_d: numbers(Some(defender_control_weight)),
-            r_tau: target_control_weight,
-            r_a: attacker_control_weight,
-            q_da: numbers(defender_running_weight),
-            f_da: numbers(defender_terminal_weight),
-            q_ad: numbers(Some(evasion_running_weight)),
-            f_ad: numbers(Some(evasion_terminal_weight)),
-            q_atau: attacker_target_running_weight,
-            f_atau: attacker_target_terminal_weight,
-            q_taua: target_running_weight,
-            f_taua: target_terminal_weight,
-            lambda: evasion,
-            gamma: numbers(Some(synthesis_weights)),
-        };
-        let game = Grid::new(horizon, step)
-            .and_then(|grid| CoreGame::new(interaction, weights, grid))
-            .map_err(|error| errors::game(py, error))?;
-        Ok(Self { game, table_bytes: table_bytes.unwrap_or(DEFAULT_TABLE_BYTES), policy: Mutex::new(None) })
+        guarded(|| {
+            let interaction = match interaction {
+                "I1" => Interaction::I1,
+                "I2" => Interaction::I2,
+                other => {
+                    return Err(PyValueError::new_err(format!("interaction is {other:?}, but it must be I1 or I2")));
+                }
+            };
+            let weights = Weights {
+                r_d: numbers(Some(defender_control_weight)),
+                r_tau: target_control_weight,
+                r_a: attacker_control_weight,
+                q_da: numbers(defender_running_weight),
+                f_da: numbers(defender_terminal_weight),
+                q_ad: numbers(Some(evasion_running_weight)),
+                f_ad: numbers(Some(evasion_terminal_weight)),
+                q_atau: attacker_target_running_weight,
+                f_atau: attacker_target_terminal_weight,
+                q_taua: target_running_weight,
+                f_taua: target_terminal_weight,
+                lambda: evasion,
+                gamma: numbers(Some(synthesis_weights)),
+            };
+            let game = Grid::new(horizon, step)
+                .and_then(|grid| CoreGame::new(interaction, weights, grid))
+                .map_err(|error| errors::game(py, error))?;
+            Ok(Self { game, table_bytes: table_bytes.unwrap_or(DEFAULT_TABLE_BYTES), generation: Generation::new() })
+        })
     }
 
     /// Number of defenders.
@@ -120,14 +118,14 @@ impl Game {
 
     /// t_0 … t_K.
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let grid = self.game.grid();
-        PyArray1::from_iter(py, (0..=grid.steps()).map(|k| grid.time(k)))
+        guarded(|| entries(py, grid.steps() + 1, |k| grid.time(k)))
     }
 
     /// The equilibrium, solved on first use.
     fn equilibrium(&self, py: Python<'_>) -> PyResult<Equilibrium> {
-        Ok(Equilibrium::new(self.policy(py)?))
+        guarded(|| Ok(Equilibrium::new(self.policy(py)?)))
     }
 
     /// The gains at t_step under an adjacency of shape (m, N).
@@ -140,31 +138,37 @@ impl Game {
         method: &str,
         max_iterations: Option<usize>,
     ) -> PyResult<Gains> {
-        let seen = adjacency.as_array();
-        let (m, n) = (self.game.constrained(), self.game.size());
-        if seen.dim() != (m, n) || step > self.game.grid().steps() {
-            return Err(PyValueError::new_err(format!(
-                "step must be at most {} and adjacency of shape ({m}, {n})",
-                self.game.grid().steps()
-            )));
-        }
-        let mut options = Options::new(match method {
-            "newton" => Method::Newton,
-            "descent" => Method::Descent,
-            other => return Err(PyValueError::new_err(format!("method is {other:?}; it must be newton or descent"))),
-        });
-        if let Some(limit) = max_iterations {
-            options.max_iterations = limit;
-        }
-        let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
-        let policy = self.policy(py)?;
-        let (gains, terms) = detach::interruptible(py, |_| {
-            let problem = policy.problem(step);
-            let gains = policy.gains(&problem, &topology, options, &mut Synthesizer::new());
-            let terms = problem.terms(policy.equilibrium().node(step), &gains.rows);
-            (gains, terms)
-        })?;
-        Ok(Gains::new(gains, terms, topology))
+        guarded(|| {
+            let seen = adjacency.as_array();
+            let (m, n) = (self.game.constrained(), self.game.size());
+            if seen.dim() != (m, n) || step > self.game.grid().steps() {
+                return Err(PyValueError::new_err(format!(
+                    "step must be at most {} and adjacency of shape ({m}, {n})",
+                    self.game.grid().steps()
+                )));
+            }
+            let mut options = Options::new(match method {
+                "newton" => Method::Newton,
+                "descent" => Method::Descent,
+                other => {
+                    return Err(PyValueError::new_err(format!("method is {other:?}; it must be newton or descent")));
+                }
+            });
+            if let Some(limit) = max_iterations {
+                options.max_iterations = limit;
+            }
+            let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
+            let policy = self.policy(py)?;
+            let (gains, terms) = detach::interruptible(py, |cancel| {
+                let (mut solver, problem) = (Synthesizer::new(), policy.problem(step, cancel)?);
+                solver.watch(cancel);
+                let gains = policy.gains(&problem, &topology, options, &mut solver)?;
+                let terms = problem.terms(policy.equilibrium().node(step), &gains.rows, cancel)?;
+                Ok((gains, terms))
+            })?
+            .map_err(|stopped| errors::stopped(py, stopped))?;
+            Ok(Gains::new(gains, terms, topology))
+        })
     }
 
     /// One recorded run; with a hysteresis or a dwell time another game than the paper's.
@@ -178,16 +182,18 @@ impl Game {
         hysteresis: f64,
         dwell: f64,
     ) -> PyResult<Record> {
-        let dim = positions.as_array().ncols();
-        let flat: Vec<f64> = positions.as_array().iter().copied().collect();
-        let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
-        let policy = self.policy(py)?;
-        let record = detach::interruptible(py, |cancel| {
-            let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
-            simulation::simulate_with(&policy, &setup, &EdgeRule { hysteresis, dwell }, cancel)
-        })?
-        .map_err(|error| errors::run(py, &self.game, error))?;
-        Ok(Record::new(policy, record))
+        guarded(|| {
+            let dim = positions.as_array().ncols();
+            let flat = copied(py, &positions)?;
+            let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
+            let policy = self.policy(py)?;
+            let record = detach::interruptible(py, |cancel| {
+                let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
+                simulation::simulate_with(&policy, &setup, &EdgeRule { hysteresis, dwell }, cancel)
+            })?
+            .map_err(|error| errors::run(py, &self.game, error))?;
+            Ok(Record::new(policy, record))
+        })
     }
 
     /// Outcomes of many runs: kind, defender, time.
@@ -201,52 +207,58 @@ impl Game {
         capture_radii: PyReadonlyArray2<'py, f64>,
         threads: Option<usize>,
     ) -> PyResult<(Bound<'py, PyArray1<i8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)> {
-        let dim = positions.as_array().dim().2;
-        let (positions, visibility, capture) =
-            (positions.as_slice()?, visibility_radii.as_slice()?, capture_radii.as_slice()?);
-        let policy = self.policy(py)?;
-        let ends = detach::interruptible(py, |cancel| {
-            let batch = Batch { dim, positions, visibility, capture };
-            ensemble::run(&policy, &batch, threads, cancel)
-        })?
-        .map_err(|error| errors::run(py, &self.game, error))?;
-        let grid = self.game.grid();
-        Ok((
-            PyArray1::from_iter(py, ends.iter().map(|(outcome, _)| outcome.code())),
-            PyArray1::from_iter(py, ends.iter().map(|(outcome, _)| outcome.defender())),
-            PyArray1::from_iter(py, ends.iter().map(|&(_, k)| grid.time(k))),
-        ))
+        guarded(|| {
+            let dim = positions.as_array().dim().2;
+            let positions = copied(py, &positions)?;
+            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let policy = self.policy(py)?;
+            let ends = detach::interruptible(py, |cancel| {
+                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
+                ensemble::run(&policy, &batch, threads, cancel)
+            })?
+            .map_err(|error| errors::run(py, &self.game, error))?;
+            let grid = self.game.grid();
+            Ok((
+                entries(py, ends.len(), |i| ends[i].0.code())?,
+                entries(py, ends.len(), |i| ends[i].0.defender())?,
+                entries(py, ends.len(), |i| grid.time(ends[i].1))?,
+            ))
+        })
     }
 
     /// The table of transitions as bytes.
     fn save_table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let policy = self.policy(py)?;
-        let bytes = detach::interruptible(py, |_| policy.save_transitions())?;
-        Ok(PyBytes::new(py, &bytes))
-    }
-
-    /// The bytes of the saved table that begins with these.
-    fn table_length(&self, py: Python<'_>, start: &[u8]) -> PyResult<u64> {
-        self.policy(py)?.transitions_length(start).map_err(|error| PyValueError::new_err(error.to_string()))
+        guarded(|| {
+            let policy = self.policy(py)?;
+            let bytes = detach::interruptible(py, |cancel| policy.save_transitions(cancel))?
+                .map_err(|stopped| errors::stopped(py, stopped))?;
+            PyBytes::new_with(py, bytes.len(), |out| {
+                out.copy_from_slice(&bytes);
+                Ok(())
+            })
+        })
     }
 
     /// Adds the entries of a saved table; the number of entries held afterwards.
     fn load_table(&self, py: Python<'_>, table: &[u8]) -> PyResult<usize> {
-        let policy = self.policy(py)?;
-        detach::interruptible(py, |_| policy.load_transitions(table))?
-            .map_err(|error| PyValueError::new_err(error.to_string()))
+        guarded(|| {
+            let policy = self.policy(py)?;
+            detach::interruptible(py, |cancel| policy.load_transitions(table, cancel))?
+                .map_err(|error| errors::table(py, error))
+        })
     }
 
     /// What the (step, topology) table has done so far.
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let held = self.policy.lock().unwrap_or_else(PoisonError::into_inner);
-        let stats = held.as_ref().map(|policy| policy.table()).unwrap_or_default();
-        let out = PyDict::new(py);
-        out.set_item("entries", stats.entries)?;
-        out.set_item("hits", stats.hits)?;
-        out.set_item("misses", stats.misses)?;
-        out.set_item("bytes", stats.bytes)?;
-        out.set_item("capacity", self.table_bytes)?;
-        Ok(out)
+        guarded(|| {
+            let stats = self.generation.solved().map(|policy| policy.table()).unwrap_or_default();
+            let out = PyDict::new(py);
+            out.set_item("entries", stats.entries)?;
+            out.set_item("hits", stats.hits)?;
+            out.set_item("misses", stats.misses)?;
+            out.set_item("bytes", stats.bytes)?;
+            out.set_item("capacity", self.table_bytes)?;
+            Ok(out)
+        })
     }
 }

@@ -8,11 +8,15 @@ mod equilibrium;
 mod errors;
 mod gains;
 mod game;
+mod generation;
+mod guard;
 mod record;
 
-use numpy::PyArray1;
+use guard::guarded;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tadcore::game::Grid;
+use tadcore::simulation::Setup;
 
 /// The compiled core of tadcore.
 #[pymodule]
@@ -27,17 +31,36 @@ mod _core {
     use super::record::Record;
     use super::*;
 
+    /// Who sees whom at positions of shape (n + 2, dim), shape (m, N), by the arithmetic of a run.
+    #[pyfunction]
+    fn observe<'py>(
+        py: Python<'py>,
+        positions: PyReadonlyArray2<'py, f64>,
+        visibility_radii: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        guarded(|| {
+            let dim = positions.as_array().ncols();
+            let (positions, visibility) = (arrays::copied(py, &positions)?, arrays::copied(py, &visibility_radii)?);
+            let setup = Setup { dim, positions: &positions, visibility: &visibility, capture: &[] };
+            let seen = setup.network().map_err(|error| errors::game(py, error))?;
+            let n = seen.size();
+            arrays::entries(py, (seen.rows(), n), |e| seen.sees(e / n, e % n))
+        })
+    }
+
     /// The vector instructions in use.
     #[pyfunction]
     fn simd(py: Python<'_>) -> PyResult<&'static str> {
-        tadcore::simd::in_use().map_err(|error| errors::simd(py, &error))
+        guarded(|| tadcore::simd::in_use().map_err(|error| errors::simd(py, &error)))
     }
 
     /// t_0 … t_K of the grid with step δ on [0, T].
     #[pyfunction]
     fn grid_times<'py>(py: Python<'py>, horizon: f64, step: f64) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let grid = Grid::new(horizon, step).map_err(|error| errors::game(py, error))?;
-        Ok(PyArray1::from_iter(py, (0..=grid.steps()).map(|k| grid.time(k))))
+        guarded(|| {
+            let grid = Grid::new(horizon, step).map_err(|error| errors::game(py, error))?;
+            arrays::entries(py, grid.steps() + 1, |k| grid.time(k))
+        })
     }
 
     #[pymodule_init]

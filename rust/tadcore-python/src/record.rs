@@ -8,7 +8,8 @@ use tadcore::cost;
 use tadcore::policy::Policy;
 use tadcore::simulation::Record as CoreRecord;
 
-use super::arrays::shaped;
+use super::arrays::{entries, shaped};
+use super::guard::guarded;
 use super::{detach, errors};
 
 /// One recorded run of L steps: rows 0…L, the last the terminal state.
@@ -54,56 +55,57 @@ impl Record {
 
     /// Times of the rows.
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, (0..self.rows()).map(|k| self.policy.game().grid().time(k)))
+    fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        guarded(|| entries(py, self.rows(), |k| self.policy.game().grid().time(k)))
     }
 
     /// Positions, shape (L + 1, n + 2, dim).
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        shaped(py, &self.record.positions, (self.rows(), self.players(), self.record.dim))
+        guarded(|| shaped(py, &self.record.positions, (self.rows(), self.players(), self.record.dim)))
     }
 
     /// Velocities, shape (L + 1, n + 2, dim).
     #[getter]
     fn control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        shaped(py, &self.record.controls, (self.rows(), self.players(), self.record.dim))
+        guarded(|| shaped(py, &self.record.controls, (self.rows(), self.players(), self.record.dim)))
     }
 
     /// 𝒜, shape (L + 1, m, N).
     #[getter]
     fn adjacency<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<bool>>> {
         let (m, n) = (self.policy.game().constrained(), self.policy.game().size());
-        let seen: Vec<bool> =
-            self.record.networks.iter().flat_map(|t| (0..m * n).map(|e| t.sees(e / n, e % n))).collect();
-        shaped(py, &seen, (self.rows(), m, n))
+        let networks = &self.record.networks;
+        guarded(|| entries(py, (self.rows(), m, n), |e| networks[e / (m * n)].sees(e / n % m, e % n)))
     }
 
     /// Gain rows, shape (L + 1, m, N).
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let game = self.policy.game();
-        shaped(py, &self.record.gains, (self.rows(), game.constrained(), game.size()))
+        guarded(|| shaped(py, &self.record.gains, (self.rows(), game.constrained(), game.size())))
     }
 
     /// Θ at each row, reduced.
     #[getter]
-    fn theta<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.record.theta)
+    fn theta<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        guarded(|| shaped(py, &self.record.theta, self.rows()))
     }
 
     /// Terms of Θ, unweighted and reduced, shape (L + 1, 4 or 3).
     #[getter]
     fn theta_terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        shaped(py, &self.record.terms, (self.rows(), self.policy.game().interaction().terms()))
+        guarded(|| shaped(py, &self.record.terms, (self.rows(), self.policy.game().interaction().terms())))
     }
 
     /// J of each player: J_d, J_τ, J_a in I1, J in I2.
     #[getter]
     fn costs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let costs = detach::interruptible(py, |_| cost::costs(&self.policy, &self.record))?
-            .map_err(|error| errors::run(py, self.policy.game(), error))?;
-        Ok(PyArray1::from_vec(py, costs))
+        guarded(|| {
+            let costs = detach::interruptible(py, |cancel| cost::costs(&self.policy, &self.record, cancel))?
+                .map_err(|error| errors::run(py, self.policy.game(), error))?;
+            shaped(py, &costs, costs.len())
+        })
     }
 
     /// Iterations of all syntheses.

@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (from, to) = (at(0), at(run.steps));
         println!("{:6}  ({:6.3}, {:6.3})  ({:6.3}, {:6.3})", symbol(player, n), from[0], from[1], to[0], to[1]);
     }
-    let costs = cost::costs(&policy, &run)?;
+    let costs = cost::costs(&policy, &run, &cancel)?;
     println!("\nJ_d = {:.4}, J_τ = {:.4}, J_a = {:.4}", costs[0], costs[1], costs[2]);
     Ok(())
 }

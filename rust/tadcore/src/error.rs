@@ -3,7 +3,7 @@
 //! A *programming or input* error is an `Err`; the *outcome of a solve* (converged, iteration limit, …) is a
 //! status inside an `Ok`. There is no catch-all variant.
 
-pub use tadcore_kernels::error::SimdError;
+pub use tadcore_kernels::error::{Cancelled, NoMemory, SimdError, Stopped};
 use thiserror::Error;
 
 /// A game, a position or a radius that cannot be accepted.
@@ -80,21 +80,13 @@ pub enum EquilibriumError {
     /// The solution left the range of double precision.
     #[error("the Riccati solution leaves the range of double precision: the weights lie too far apart")]
     Range,
-    /// The system gave no memory.
-    #[error("the system gave no {bytes} bytes for P on the grid: a larger step or a shorter horizon needs less")]
-    Memory {
-        /// Bytes asked for.
-        bytes: usize,
-    },
+    /// There was no memory.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
-
-/// The caller asked to stop, by the cancel token it passed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("cancelled by the caller")]
-pub struct Cancelled;
 
 /// Bytes that are not a table of this game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -113,17 +105,15 @@ pub enum TableError {
     /// A table of other weights, another grid or another version.
     #[error("the table belongs to another game, or to another version of tadcore")]
     OtherGame,
-    /// More than a table may hold.
-    #[error("the table says that it has {found} entries, and a table of this game has at most {most}")]
-    TooMany {
-        /// The entries that it says it has.
-        found: u64,
-        /// Entries that fit into the bytes of a table.
-        most: usize,
-    },
     /// Cut short or changed.
     #[error("the table is damaged: its length or its checksum is wrong")]
     Damaged,
+    /// There was no memory.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
+    /// The caller asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
 /// A run or a batch could not be done.
@@ -155,7 +145,28 @@ pub enum RunError {
     /// The system gave no threads.
     #[error("threads is {0}, but the system would not start that many")]
     Threads(usize),
+    /// There was no memory.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
     /// The caller asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<Stopped> for EquilibriumError {
+    fn from(stopped: Stopped) -> Self {
+        match stopped {
+            Stopped::Cancelled(cancelled) => cancelled.into(),
+            Stopped::Memory(none) => none.into(),
+        }
+    }
+}
+
+impl From<Stopped> for RunError {
+    fn from(stopped: Stopped) -> Self {
+        match stopped {
+            Stopped::Cancelled(cancelled) => cancelled.into(),
+            Stopped::Memory(none) => none.into(),
+        }
+    }
 }

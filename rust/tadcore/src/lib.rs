@@ -37,7 +37,7 @@
 //!
 //! | layer | what it knows |
 //! |---|---|
-//! | [`error`], [`cancel`] | failures with their numbers; the flag that stops a computation |
+//! | [`error`], [`cancel`], [`memory`] | failures with their numbers; the flag that stops a computation; memory asked for |
 //! | [`simd`] | vector instructions; loops compiled for each width of the registers |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
@@ -49,7 +49,7 @@
 //! | [`ensemble`] | many runs, outcomes only |
 //!
 //! What is compiled for many sizes and widths, and therefore takes long, is a crate of its own, `tadcore-kernels`, with
-//! modules of the same names: `simd`, and of `synthesis`, `policy` and `ensemble` what knows no game and no network.
+//! modules of the same names: `cancel`, `memory`, `simd`, and of `synthesis`, `policy` and `ensemble` what knows no game and no network.
 //!
 //! ## Reduced matrices
 //!
@@ -62,7 +62,6 @@
 //! Up to N = 8 kernels are compiled for their size and live on the stack (nalgebra where a matrix type helps); larger
 //! games use faer's blocked kernels, single-threaded. Each module that switches says why, by measurement.
 
-pub mod cancel;
 pub mod cost;
 pub mod ensemble;
 pub mod error;
@@ -73,4 +72,4 @@ pub mod riccati;
 pub mod simulation;
 pub mod synthesis;
 
-pub use tadcore_kernels::simd;
+pub use tadcore_kernels::{cancel, memory, simd};

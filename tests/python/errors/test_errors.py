@@ -6,7 +6,7 @@ import pickle
 import pytest
 
 import tadcore
-from tadcore import NoEquilibriumError, ScenarioError, StoreError, TadcoreError, WorkerError
+from tadcore import NoEquilibriumError, OutOfMemoryError, ScenarioError, StoreError, TadcoreError, WorkerError
 
 
 def test_every_error_is_one_of_ours_and_a_built_in():
@@ -72,13 +72,18 @@ def test_a_value_whose_repr_fails_does_not_hide_the_error():
     ("error", "text"),
     [
         (StoreError("out", "it is full", "make room"), "out: it is full; make room"),
+        (
+            OutOfMemoryError("P on the grid", 3 << 30, 2 << 30),
+            "P on the grid: 3,221,225,472 bytes (3.0 GiB), more than",
+        ),
+        (OutOfMemoryError("P on the grid", 3 << 30), "(3.0 GiB), which the system would not give; fewer defenders"),
         (WorkerError("killed", 2, 5, "out"), "when 2 of 5 chunks were finished; they are kept in out: run the study"),
         (WorkerError("killed", 2, 5, None), "they are lost: with store=… a study keeps them"),
     ],
 )
-def test_faults_of_stores_and_workers_say_what_to_do_and_travel(error, text):
+def test_faults_of_memory_stores_and_workers_say_what_to_do_and_travel(error, text):
     assert isinstance(error, TadcoreError)
-    assert isinstance(error, RuntimeError)
+    assert isinstance(error, MemoryError if isinstance(error, OutOfMemoryError) else RuntimeError)
     assert text in str(error)
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is type(error)

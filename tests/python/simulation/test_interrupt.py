@@ -1,4 +1,4 @@
-"""Ctrl-C in the middle of a batch and of a study: cold and warm, small and large games.
+"""Ctrl-C in the middle of a batch and of a study, cold and warm, small and large games; and of every long computation.
 
 The rule is 0.2 s on a quiet machine. The measured time is printed; what is asserted leaves room for a busy one.
 """
@@ -66,3 +66,97 @@ def test_it_stops_soon(n, what, how):
     assert said == "interrupted"
     print(f"n = {n}, {what}, {how}: stopped after {float(at) - sent:.3f} s")
     assert float(at) - sent < ROOM
+
+
+LONG = """
+import os, signal, sys, threading, time
+import numpy as np
+import tadcore
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+what, n = sys.argv[1], int(sys.argv[2])
+rng = np.random.default_rng(3)
+zeta = 0.7 * n**0.5 if what != "equilibrium" else float("inf")
+second = what.endswith("I2")
+defender = {"control_weight": 1.0, "capture_radius": 0.001, "visibility_radius": zeta}
+steps, horizon = {"P": 400_000}.get(what, 10), 0.005 if what == "newton-I2" else 0.05
+sc = tadcore.Scenario.model_validate({
+    "interaction": "I2" if second else "I1", "horizon": horizon, "step": horizon / steps,
+    "attacker": {"position": [-1.0, -1.0], "control_weight": 0.8, "capture_radius": 0.001},
+    "target": {"position": [1.0, 1.0], "control_weight": 1.2, **({"visibility_radius": zeta} if second else {})},
+    "defenders": [{**defender, "position": p} for p in rng.uniform(0, n**0.5, (n, 2)).tolist()],
+})
+network = tadcore.VisibilityNetwork.from_positions(sc)
+if what not in ("equilibrium", "equilibrium-I2"):
+    solved = tadcore.solve_equilibrium(sc)
+
+def endless():
+    # A thread that changes the radii while they are in use: the call has its own.
+    radii = np.full((2_000, n), zeta)
+    threading.Thread(target=lambda: [radii.__imul__(-1.0) for _ in iter(int, 1)], daemon=True).start()
+    positions = np.repeat([sc.positions], 2_000, 0)
+    while True:
+        try:
+            tadcore.simulate_batch(sc, positions, radii)
+        except tadcore.ScenarioError:
+            pass
+
+def again(call):
+    while True:
+        call()
+
+calls = {
+    "newton": lambda: tadcore.synthesize(sc, step=0, adjacency=network),
+    "newton-I2": lambda: tadcore.synthesize(sc, step=0, adjacency=network),
+    "descent": lambda: again(lambda: tadcore.synthesize(sc, step=0, adjacency=network, method="descent")),
+    "equilibrium": lambda: again(lambda: tadcore.solve_equilibrium(sc.replace({"horizon": 50.0, "step": 5.0}))),
+    "equilibrium-I2": lambda: again(lambda: tadcore.solve_equilibrium(sc)),
+    "residual": lambda: again(solved._core.residual),
+    "P": lambda: again(lambda: solved._core.P),
+    "run": lambda: again(lambda: tadcore.simulate(sc)),
+    "batch": lambda: tadcore.simulate_batch(sc, np.repeat([sc.positions], 64, 0) + rng.normal(size=(64, n + 2, 2))),
+    "threads": lambda: again(lambda: tadcore.simulate_batch(
+        sc, np.repeat([sc.positions], 200_000, 0) + rng.normal(size=(200_000, n + 2, 2)), threads=65_536)),
+    "radii": endless,
+    "verify": lambda: again(lambda: tadcore.verify(sc)),
+}
+# SIGINT comes from a thread of the process itself, so that it comes after the work has begun.
+def interrupt():
+    time.sleep(1.0)
+    print("sent", time.monotonic(), flush=True)
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    calls[what]()
+    print("finished", time.monotonic(), flush=True)
+except KeyboardInterrupt:
+    print("interrupted", time.monotonic(), flush=True)
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to a process are POSIX")
+@pytest.mark.parametrize(
+    ("what", "n"),
+    [
+        ("newton", 40),
+        ("newton", 90),
+        ("newton-I2", 60),
+        ("descent", 60),
+        ("equilibrium", 300),
+        ("equilibrium-I2", 500),
+        ("residual", 300),
+        ("P", 12),
+        ("run", 60),
+        ("batch", 30),
+        ("threads", 3),
+        ("radii", 3),
+    ],
+)
+def test_every_long_computation_stops_soon(what, n):
+    done = subprocess.run([sys.executable, "-c", LONG, what, str(n)], capture_output=True, text=True, timeout=300)
+    said = dict(line.split() for line in done.stdout.splitlines())
+    assert set(said) == {"sent", "interrupted"}, (done.stdout, done.stderr[-2000:])
+    took = float(said["interrupted"]) - float(said["sent"])
+    print(f"{what}, n = {n}: stopped after {took:.3f} s")
+    assert took < ROOM

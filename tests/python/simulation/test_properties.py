@@ -52,14 +52,16 @@ def scenarios(draw, most=4, weight=PLAIN, coordinate=NEAR, radius=SMALL):
             for _ in range(draw(st.integers(1, most)))
         ],
     }
+    places = np.array([part["position"] for part in (data["attacker"], data["target"], *data["defenders"])])
+    least = 1.001e-12 * float(np.abs(places - places[0]).max())
     for d in data["defenders"]:
         if draw(st.booleans()):
             sight = d["capture_radius"] * draw(st.floats(1.001, 40.0))
-            d["visibility_radius"] = sight if sight > d["capture_radius"] else math.inf
+            d["visibility_radius"] = sight if sight > max(d["capture_radius"], least) else math.inf
     if interaction == "I1" and draw(st.booleans()):
         data["attacker"]["evasion"] = draw(st.floats(0.0, 1.0))
     if interaction == "I2" and draw(st.booleans()):
-        data["target"]["visibility_radius"] = draw(radius)
+        data["target"]["visibility_radius"] = max(draw(radius), least)
     if draw(st.booleans()):
         terms = 4 if interaction == "I1" else 3
         gamma = draw(st.lists(st.floats(0.0, 1.0), min_size=terms, max_size=terms))
@@ -154,6 +156,45 @@ def test_costs_and_values_are_finite(sc):
         assert np.isfinite(np.einsum("kia,kij,kja->k", z, P[: len(z)], z)).all()
     assert np.isfinite(run.theta).all()
     assert (run.theta >= 0.0).all()
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.sampled_from(["I1", "I2"]),
+    st.sampled_from([9, 30, 61, 100, 201, 320]),
+    st.sampled_from([1e-9, 1e-6, 1e-3]),
+    st.sampled_from([1e-3, 0.4, 0.9, 20.0, math.inf]),
+    st.integers(0, 2**32 - 1),
+)
+def test_large_teams_in_short_games_are_played_or_refused_by_size(interaction, n, horizon, sight, seed):
+    """As many unknowns as edges: none where nobody sees anyone or all see all, and more than fit in between."""
+    places = np.random.default_rng(seed).uniform(0.0, math.sqrt(n), (n + 2, 2)).tolist()
+    reach = {"capture_radius": 1e-5}
+    seeing = {"control_weight": 1.0, "visibility_radius": sight}
+    sc = Scenario.model_validate(
+        {
+            "interaction": interaction,
+            "horizon": horizon,
+            "step": horizon,
+            "attacker": {"position": places[0], "control_weight": 0.8, **reach},
+            "target": {"position": places[1], **({"control_weight": 1.2} if interaction == "I1" else seeing)},
+            "defenders": [{"position": place, **seeing, **reach} for place in places[2:]],
+        }
+    )
+    seen = tadcore.VisibilityNetwork.from_positions(sc).adjacency
+    unknowns = 0 if seen.all() else int(seen.sum())
+    if 300 < unknowns < 9_000:  # played, too, but not within the time of a test
+        sc = sc.replace({"d*.visibility_radius": 1e-3})
+    if unknowns > 10_000:
+        with pytest.raises(
+            tadcore.OutOfMemoryError, match=r"the synthesis of the gains under one network: [\d,]+ bytes"
+        ):
+            tadcore.simulate(sc)
+        return
+    run = tadcore.simulate(sc)
+    assert np.isfinite(run.gains).all()
+    assert len(run.times) == 2
+    assert tadcore.simulate_batch(sc, [sc.positions])[0] == run.outcome
 
 
 @given(scenarios(), st.integers(0, 2**64 - 1), st.sampled_from(["random", "sobol", "latin"]))

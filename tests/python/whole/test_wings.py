@@ -21,8 +21,7 @@ FLOORS = (
     ("statistics",),
     ("game", "scenarios"),
     ("scenario",),
-    ("sampling",),
-    ("_shared",),
+    ("sampling", "_shared"),
     ("errors",),
     ("_core",),
 )

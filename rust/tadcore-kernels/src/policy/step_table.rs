@@ -9,6 +9,8 @@
 //! nothing.
 
 use super::index::Index;
+use crate::error::NoMemory;
+use crate::memory::{append, reserve};
 use crate::simd::prefetch;
 
 /// Bytes of a cache line.
@@ -17,6 +19,9 @@ const LINE: usize = 64;
 const DIRECT_LINE: usize = LINE / size_of::<u16>();
 /// Numbers of a matrix in one.
 const MATRIX_LINE: usize = LINE / size_of::<f64>();
+
+/// What asks for memory here.
+const WHAT: &str = "the table of transitions at one instant";
 
 /// Rows of a stored column for matrices of `n` rows: whole vectors of four.
 #[must_use]
@@ -129,30 +134,33 @@ impl StepTable {
     }
 
     /// Adds an entry that is not there yet, and its canonical form if that is listed.
-    pub fn insert(&mut self, words: &[u64], canonical: Option<&[u64]>, matrix: &[f64]) {
+    pub fn insert(&mut self, words: &[u64], canonical: Option<&[u64]>, matrix: &[f64]) -> Result<(), NoMemory> {
         debug_assert!(self.find(words) == 0 && matrix.len() == self.stride);
         if self.matrices.capacity() < self.matrices.len() + self.stride {
-            self.grow();
+            self.grow()?;
         }
         let slot = self.matrices().len() / self.stride;
+        append(WHAT, &mut self.keys, words)?;
         self.matrices.extend_from_slice(matrix);
-        self.keys.extend_from_slice(words);
         self.index.insert(words, slot, self.bits);
         if let Some(canonical) = canonical.filter(|canonical| self.canonical_forms.find(canonical) == 0) {
             self.canonical_forms.insert(canonical, slot, self.bits);
         }
+        Ok(())
     }
 
     /// Doubles the room for matrices; slot 0 is there from the beginning.
-    fn grow(&mut self) {
+    fn grow(&mut self) -> Result<(), NoMemory> {
         let held = self.matrices().len().max(self.stride);
         let most = MATRIX_LINE - 1;
-        let mut larger = Vec::<f64>::with_capacity(2 * held + most);
+        let mut larger = Vec::<f64>::new();
+        reserve(WHAT, &mut larger, 2 * held + most)?;
         let skip = larger.as_ptr().align_offset(LINE).min(most);
         larger.resize(skip, 0.0);
         larger.extend_from_slice(self.matrices());
         larger.resize(skip + held, 0.0);
         (self.matrices, self.skip) = (larger, skip);
+        Ok(())
     }
 
     /// Forgets every entry and keeps the memory.
@@ -185,7 +193,7 @@ mod tests {
             };
             for i in 0..3000 {
                 assert_eq!(table.find(&key(i)), 0, "{rows} {size} {i}");
-                table.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]);
+                table.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]).expect("memory");
             }
             assert_eq!(table.len(), 3000);
             for i in 0..3000 {

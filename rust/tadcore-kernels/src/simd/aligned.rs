@@ -2,6 +2,9 @@
 
 use std::ops::{Deref, DerefMut};
 
+use crate::error::NoMemory;
+use crate::memory;
+
 /// Bytes of a cache line and of the widest register.
 const LINE: usize = 64;
 
@@ -13,11 +16,11 @@ pub struct Aligned {
 }
 
 impl Aligned {
-    pub fn zeros(len: usize) -> Self {
+    pub fn zeros(what: &'static str, len: usize) -> Result<Self, NoMemory> {
         let spare = LINE / size_of::<f64>() - 1;
-        let numbers = vec![0.0; len + spare];
+        let numbers: Vec<f64> = memory::zeros(what, len + spare)?;
         let start = numbers.as_ptr().align_offset(LINE).min(spare);
-        Self { numbers, start, len }
+        Ok(Self { numbers, start, len })
     }
 }
 

@@ -5,23 +5,36 @@
 //! number of products grows with the logarithm of ‖C‖δ, so no step is too stiff. Modes much slower than ‖C‖ are known
 //! to some ‖C‖δ roundings, as they are in exp(Cδ) and in C itself.
 
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
+use crate::memory::{copy, zeros};
 use crate::policy::exponential::{exponential, multiply};
+
+/// What asks for memory here.
+const WHAT: &str = "the costs of one run";
 
 /// Terms of the series: the last is below 10⁻²⁴ of the first, since ‖C‖h ≤ ½ in both norms.
 const TERMS: usize = 24;
 
 /// Writes into `m`, which holds matrices M (N × N, symmetric), the W of each.
-pub(super) fn gramians(c: &[f64], n: usize, step: f64, m: &mut [Vec<f64>]) {
+pub(super) fn gramians(
+    c: &[f64],
+    n: usize,
+    step: f64,
+    m: &mut [Vec<f64>],
+    cancel: &CancelToken,
+) -> Result<(), Stopped> {
     let doublings = doublings(c, n, step);
     let h = step * 0.5_f64.powi(doublings);
-    let (mut e, mut unused) = (vec![0.0; n * n], vec![0.0; n]);
-    exponential(c, &vec![0.0; n], h, &mut e, &mut unused);
-    let (mut half, mut next) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let (mut e, mut unused) = (zeros(WHAT, n * n)?, vec![0.0; n]);
+    exponential(c, &vec![0.0; n], h, &mut e, &mut unused, cancel)?;
+    let (mut half, mut next) = (zeros(WHAT, n * n)?, zeros(WHAT, n * n)?);
     for w in m.iter_mut() {
-        let mut term: Vec<f64> = w.iter().map(|x| x * h).collect();
+        let mut term = copy(WHAT, w)?;
+        term.iter_mut().for_each(|x| *x *= h);
         w.copy_from_slice(&term);
         for j in 0..TERMS {
-            multiply(&mut half, &term, c, n);
+            multiply(&mut half, &term, c, n, cancel)?;
             for (ij, x) in term.iter_mut().enumerate() {
                 *x = (half[ij] + half[ij % n * n + ij / n]) * (h / (j + 2) as f64);
             }
@@ -29,15 +42,17 @@ pub(super) fn gramians(c: &[f64], n: usize, step: f64, m: &mut [Vec<f64>]) {
         }
     }
     for _ in 0..doublings {
-        let transposed: Vec<f64> = (0..n * n).map(|ij| e[ij % n * n + ij / n]).collect();
+        let mut transposed = zeros(WHAT, n * n)?;
+        transposed.iter_mut().enumerate().for_each(|(ij, x)| *x = e[ij % n * n + ij / n]);
         for w in m.iter_mut() {
-            multiply(&mut half, w, &e, n);
-            multiply(&mut next, &transposed, &half, n);
+            multiply(&mut half, w, &e, n, cancel)?;
+            multiply(&mut next, &transposed, &half, n, cancel)?;
             w.iter_mut().zip(&next).for_each(|(w, x)| *w += x);
         }
-        multiply(&mut next, &e, &e, n);
+        multiply(&mut next, &e, &e, n, cancel)?;
         std::mem::swap(&mut e, &mut next);
     }
+    Ok(())
 }
 
 /// How often to halve a step until ‖C‖h ≤ ½, by rows and by columns.
@@ -62,7 +77,7 @@ mod tests {
         for rate in [-1e9, -1e5, -3.0, -1e-3, 1e-3, 0.7, 30.0] {
             let c = [rate, 1.0, 0.0, rate];
             let mut w = vec![vec![1.0, 0.0, 0.0, 0.0], vec![0.0, 0.0, 0.0, 1.0]];
-            gramians(&c, 2, 1.0, &mut w);
+            gramians(&c, 2, 1.0, &mut w, &CancelToken::new()).expect("memory");
             // ∫ e^{2λs} s^j ds over [0, 1] by parts, and by its series where the parts cancel.
             let a = 2.0 * rate;
             let integral = |j: i32| -> f64 {

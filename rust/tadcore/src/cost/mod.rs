@@ -9,6 +9,7 @@
 
 mod gramian;
 
+use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::Interaction;
 use crate::policy::{Policy, closed_loop};
@@ -34,8 +35,9 @@ const PIECES: f64 = 32.0;
 /// team).
 ///
 /// # Errors
-/// [`RunError::Cost`] where one lies beyond the range of double precision.
-pub fn costs(policy: &Policy, record: &Record) -> Result<Vec<f64>, RunError> {
+/// [`RunError::Cost`] where one lies beyond the range of double precision; or when there is no memory, or `cancel` was
+/// raised.
+pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<Vec<f64>, RunError> {
     let game = policy.game();
     let (size, dim, m) = (game.size(), record.dim, game.constrained());
     let step = game.grid().step();
@@ -43,6 +45,7 @@ pub fn costs(policy: &Policy, record: &Record) -> Result<Vec<f64>, RunError> {
     let mut total = vec![0.0; running.len()];
     let mut c = vec![0.0; size * size];
     for k in 0..record.steps {
+        cancel.check()?;
         let gains = &record.gains[k * m * size..(k + 1) * m * size];
         let free = policy.free_rows(k);
         closed_loop::matrix(&free, gains, &mut c);
@@ -54,12 +57,13 @@ pub fn costs(policy: &Policy, record: &Record) -> Result<Vec<f64>, RunError> {
         let mut z = relative(record, k, size, dim);
         if pieces > PIECES {
             let mut forms = forms(policy, &running, &rows);
-            gramian::gramians(&c, size, step, &mut forms);
+            gramian::gramians(&c, size, step, &mut forms, cancel)?;
             total.iter_mut().zip(&forms).for_each(|(j, w)| *j += 0.5 * quadratic(w, &z, dim));
             continue;
         }
         let h = step / pieces;
         for _ in 0..pieces as usize {
+            cancel.check()?;
             let series = expansion(&c, &z, size, dim, h);
             for (s, weight) in GAUSS {
                 let at = evaluate(&series, s);

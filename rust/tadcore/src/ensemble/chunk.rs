@@ -8,7 +8,7 @@ use super::Batch;
 use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep};
 use super::sweep::sweep_of;
 use crate::cancel::CancelToken;
-use crate::error::RunError;
+use crate::error::{NoMemory, RunError};
 use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
@@ -101,7 +101,7 @@ impl<'a> Chunk<'a> {
                 w.missing.dedup();
                 w.local.clear();
                 misses += w.filler.fill(self.policy, k, &w.missing, &mut w.local, cancel)?;
-                self.follow(k, w);
+                self.follow(k, w)?;
             }
             if self.blocks.live == 0 {
                 break;
@@ -137,7 +137,7 @@ impl<'a> Chunk<'a> {
     }
 
     /// Moves the blocks that waited, from the table or, past the table's budget, from what this worker just solved.
-    fn follow(&mut self, k: usize, w: &mut Worker) {
+    fn follow(&mut self, k: usize, w: &mut Worker) -> Result<(), NoMemory> {
         let table = self.policy.transitions().step_table(k);
         for &block in &w.waiting {
             if self.alone(block, &table, &mut w.keys) {
@@ -148,12 +148,13 @@ impl<'a> Chunk<'a> {
                 w.words.extend(w.keys.iter().map(|word| word[lane]));
                 if w.local.find(&w.words) == 0 {
                     let held = table.find(&w.words) as usize;
-                    w.local.insert(&w.words, None, table.matrix(held));
+                    w.local.insert(&w.words, None, table.matrix(held))?;
                 }
             }
             let moved = self.alone(block, &w.local, &mut w.keys);
             debug_assert!(moved, "a block misses what was just solved");
         }
+        Ok(())
     }
 
     /// Moves one block, if the table holds all it needs.

@@ -1,6 +1,7 @@
 //! Many games of one policy, outcomes only, in lockstep.
 //!
-//! The trials are cut into chunks of at most [`CHUNK`]; a chunk's states fit the second cache, and at each instant the
+//! The trials are cut into chunks of at most [`CHUNK`], fewer in large games, where each trial may need a matrix of its
+//! own; a chunk's states fit the second cache, and at each instant the
 //! part of the table in use fits the first, while the next instant's is on its way. Chunks are played by a pool of
 //! threads made for the call; what a trial does depends on its own row and on nothing else, so the outcomes are the
 //! same bits for any number of threads and any way of cutting.
@@ -19,7 +20,8 @@ use rayon::prelude::*;
 
 use crate::cancel::CancelToken;
 use crate::error::RunError;
-use crate::policy::Policy;
+use crate::memory;
+use crate::policy::{Policy, step_table};
 use crate::simd::Width;
 use crate::simulation::{Outcome, Setup};
 use chunk::{Chunk, End, Worker};
@@ -27,6 +29,12 @@ use tadcore_kernels::ensemble::{block, sweep};
 
 /// Trials of one chunk at most.
 pub const CHUNK: usize = 8192;
+/// Bytes, at most, of the transitions that the trials of a chunk may need at one instant, if each needs its own.
+const CHUNK_BYTES: usize = 64 << 20;
+/// Trials that are checked between two looks at the cancel token.
+const CHECKED: usize = 4096;
+/// Threads beyond which more would only be started: for each core, and on machines of few.
+const THREADS: (usize, usize) = (4, 64);
 
 /// Positions and radii of M games; radii are M rows, or one row shared by all.
 #[derive(Debug, Clone, Copy)]
@@ -85,12 +93,22 @@ pub fn run(
     let (n, m) = (policy.game().n(), policy.game().constrained());
     let trials = batch.len(n + 2);
     for i in 0..trials {
+        if i % CHECKED == 0 {
+            cancel.check()?;
+        }
         batch.setup(i, n, m).check(policy.game())?;
     }
-    let mut ends = vec![(Outcome::Timeout, 0); trials];
-    let threads = threads.filter(|&t| t > 0).unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+    let mut ends = Vec::new();
+    memory::grow("the outcomes of a batch", &mut ends, trials, (Outcome::Timeout, 0))?;
+    let cores = available_parallelism().map_or(1, usize::from);
+    let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
     play(policy, batch, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
+}
+
+/// Trials of one chunk at most in a game of N = `size`.
+fn most_trials(size: usize) -> usize {
+    (CHUNK_BYTES / (size_of::<f64>() * size * step_table::padded(size))).clamp(block::LANES, CHUNK)
 }
 
 /// Plays checked trials in chunks.
@@ -102,8 +120,10 @@ fn play(
     ends: &mut [End],
     cancel: &CancelToken,
 ) -> Result<(), RunError> {
-    // Equal chunks, as many for each thread.
-    let rounds = ends.len().div_ceil(threads.saturating_mul(CHUNK)).max(1);
+    // No thread without a block of trials; equal chunks, as many for each thread.
+    let threads = threads.min(ends.len().div_ceil(block::LANES)).max(1);
+    let most = most_trials(policy.game().size());
+    let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
     let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
     let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
         Chunk::new(policy, batch, c * size, ends.len(), width).play(ends, worker, cancel)
@@ -143,7 +163,7 @@ mod tests {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![(Outcome::Timeout, 0); 50];
                     play(&policy, &batch, 1, width, &mut ends, &cancel).expect("a batch");
-                    (ends, policy.save_transitions())
+                    (ends, policy.save_transitions(&cancel).expect("memory"))
                 });
                 let played: Vec<_> = played.collect();
                 assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n}");

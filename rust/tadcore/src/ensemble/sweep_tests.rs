@@ -59,7 +59,7 @@ fn blocks_stop_where_single_strips_do() {
     let mut table = StepTable::new(3, 4);
     for key in (0..1 << 12).filter(|key| key % 41 != 3) {
         let matrix: Vec<f64> = (0..16).map(|e| f64::from(e % 5 == 0) + 0.01 * wave(e + key)).collect();
-        table.insert(&[key as u64], None, &matrix);
+        table.insert(&[key as u64], None, &matrix).expect("memory");
     }
     let blocks = || Blocks {
         z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),

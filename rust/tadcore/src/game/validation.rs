@@ -16,6 +16,9 @@ pub(crate) fn positive(field: &str, value: f64) -> Result<(), GameError> {
 pub(crate) const WEIGHTS: (f64, f64) = (1e-30, 1e30);
 /// The largest coordinate: its square, and a cost, stay within a double.
 pub(crate) const FARTHEST: f64 = 1e100;
+/// The least visibility radius, relative to the largest distance from the attacker along an axis: positions relative to the
+/// attacker are rounded by a 10⁻¹⁶th of that, and so is every distance between two other players.
+pub(crate) const FINEST: f64 = 1e-12;
 /// How far a player may be driven, and how fast, within a run: beyond it a cost is no double any more.
 pub(crate) const BEYOND: f64 = 1e120;
 /// The most memory that P on the grid and the empty tables may take.

@@ -5,9 +5,13 @@
 
 use super::Topology;
 
-/// The largest x with √x ≤ `radius` in double arithmetic: `d² <= squared_reach(ζ)` is exactly `d²`.sqrt() <= ζ.
+/// The largest x with √x ≤ `radius` in double arithmetic: `d² <= squared_reach(ζ)` is exactly `d²`.sqrt() <= ζ. Of what
+/// is no radius, negative or no number, −1: nothing is within it.
 #[must_use]
 pub fn squared_reach(radius: f64) -> f64 {
+    if radius.is_nan() || radius < 0.0 {
+        return -1.0;
+    }
     let mut square = radius * radius;
     if !square.is_finite() {
         return if radius.is_infinite() { f64::INFINITY } else { f64::MAX };
@@ -63,6 +67,8 @@ mod tests {
             assert!(reach.sqrt() <= radius && reach.next_up().sqrt() > radius || reach == f64::MAX, "{radius}");
         }
         assert_eq!(squared_reach(f64::INFINITY), f64::INFINITY);
+        assert_eq!([-1e-300, -5.0, f64::NEG_INFINITY, f64::NAN].map(squared_reach), [-1.0; 4]);
+        assert_eq!(squared_reach(0.0), 0.0);
     }
 
     /// Of two radii whose squares are the largest that root to them: a distance on the rim is seen, one double further

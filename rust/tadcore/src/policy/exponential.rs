@@ -5,12 +5,20 @@
 //! Up to N = 8 the products are nalgebra's on the stack; beyond, faer's. (At N = 9 the two cost the same; at N = 31
 //! faer is 3 times as fast.)
 
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
+use crate::memory::{copy, zeros};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{RowSVector, SMatrix};
 
 /// Halvings of a step; a loop that needs more moves by 2^1000 in one step and is reported as not finite.
 const HALVINGS: i32 = 1000;
+/// What asks for memory here.
+pub(super) const WHAT: &str = "the transition of one step";
+/// Rows and columns of a product that are formed between two looks at the cancel token; no game within the sizes that
+/// were measured has as many.
+const ROWS: usize = 512;
 /// Terms of the series; fifteen reach rounding at ‖C‖h = ½.
 const TERMS: usize = 24;
 
@@ -26,7 +34,17 @@ fn halvings(c: &[f64], n: usize, step: f64) -> i32 {
 }
 
 /// Writes exp(C·step) into `e` (N × N, row-major) and h ∫₀^step exp(Cs) ds into `a` (N), h being `row`.
-pub fn exponential(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64]) {
+///
+/// # Errors
+/// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+pub fn exponential(
+    c: &[f64],
+    row: &[f64],
+    step: f64,
+    e: &mut [f64],
+    a: &mut [f64],
+    cancel: &CancelToken,
+) -> Result<(), Stopped> {
     match row.len() {
         1 => small::<1>(c, row, step, e, a),
         2 => small::<2>(c, row, step, e, a),
@@ -36,8 +54,9 @@ pub fn exponential(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f6
         6 => small::<6>(c, row, step, e, a),
         7 => small::<7>(c, row, step, e, a),
         8 => small::<8>(c, row, step, e, a),
-        _ => large(c, row, step, e, a),
+        _ => return large(c, row, step, e, a, cancel),
     }
+    Ok(())
 }
 
 fn small<const N: usize>(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64]) {
@@ -68,19 +87,20 @@ fn small<const N: usize>(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &m
     }
 }
 
-fn large(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64]) {
+fn large(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64], cancel: &CancelToken) -> Result<(), Stopped> {
     let n = row.len();
     let s = halvings(c, n, step);
     let h = step * 0.5f64.powi(s);
-    let x: Vec<f64> = c.iter().map(|v| v * h).collect();
-    let mut term = vec![0.0; n * n];
+    let mut x = copy(WHAT, c)?;
+    x.iter_mut().for_each(|v| *v *= h);
+    let mut term = zeros(WHAT, n * n)?;
     for i in 0..n {
         term[i * n + i] = 1.0;
     }
-    let (mut sum, mut integral, mut next) = (term.clone(), term.clone(), vec![0.0; n * n]);
+    let (mut sum, mut integral, mut next) = (copy(WHAT, &term)?, copy(WHAT, &term)?, zeros(WHAT, n * n)?);
     let largest = |m: &[f64]| m.iter().fold(0.0, |a: f64, &b| a.max(b.abs()));
     for k in 1..=TERMS {
-        multiply(&mut next, &term, &x, n);
+        multiply(&mut next, &term, &x, n, cancel)?;
         for ((t, v), (s, i)) in term.iter_mut().zip(&next).zip(sum.iter_mut().zip(&mut integral)) {
             *t = v / k as f64;
             *s += *t;
@@ -97,22 +117,27 @@ fn large(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64]) {
     for _ in 0..s {
         let more = times(a, &sum, 1.0);
         a.iter_mut().zip(more).for_each(|(a, m)| *a += m);
-        multiply(&mut next, &sum, &sum, n);
+        multiply(&mut next, &sum, &sum, n, cancel)?;
         std::mem::swap(&mut sum, &mut next);
     }
     e.copy_from_slice(&sum);
+    Ok(())
 }
 
-/// out = a b, N × N.
-pub(crate) fn multiply(out: &mut [f64], a: &[f64], b: &[f64], n: usize) {
-    matmul(
-        MatMut::from_row_major_slice_mut(out, n, n),
-        Accum::Replace,
-        MatRef::from_row_major_slice(a, n, n),
-        MatRef::from_row_major_slice(b, n, n),
-        1.0,
-        Par::Seq,
-    );
+/// out = a b, N × N, in tiles of [`ROWS`].
+pub(crate) fn multiply(out: &mut [f64], a: &[f64], b: &[f64], n: usize, cancel: &CancelToken) -> Result<(), Stopped> {
+    let (a, b) = (MatRef::from_row_major_slice(a, n, n), MatRef::from_row_major_slice(b, n, n));
+    let mut out = MatMut::from_row_major_slice_mut(out, n, n);
+    for row in (0..n).step_by(ROWS) {
+        for column in (0..n).step_by(ROWS) {
+            cancel.check()?;
+            let (height, width) = (ROWS.min(n - row), ROWS.min(n - column));
+            let tile = out.as_mut().submatrix_mut(row, column, height, width);
+            let (a, b) = (a.subrows(row, height), b.subcols(column, width));
+            matmul(tile, Accum::Replace, a, b, 1.0, Par::Seq);
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -132,7 +157,7 @@ mod tests {
                 let mut row = vec![0.0; n];
                 row[0] = 1.0;
                 let (mut e, mut a) = (vec![0.0; n * n], vec![0.0; n]);
-                exponential(&c, &row, angle, &mut e, &mut a);
+                exponential(&c, &row, angle, &mut e, &mut a, &CancelToken::new()).expect("memory");
                 let tolerance = 1e-15 * (1.0 + 10.0 * angle);
                 assert!((e[0] - angle.cos()).abs() < tolerance, "{n} {angle}");
                 assert!((e[1] + angle.sin()).abs() < tolerance);

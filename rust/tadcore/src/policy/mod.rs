@@ -27,8 +27,9 @@ pub use table::{DEFAULT_TABLE_BYTES, TableStats};
 pub(crate) use tadcore_kernels::policy::step_table;
 
 use crate::cancel::CancelToken;
-use crate::error::{EquilibriumError, TableError};
+use crate::error::{EquilibriumError, Stopped, TableError};
 use crate::game::Game;
+use crate::memory::{spare, zeros};
 use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
@@ -58,7 +59,7 @@ impl StepPolicy {
 #[derive(Debug)]
 pub struct Policy {
     game: Game,
-    equilibrium: Equilibrium,
+    equilibrium: Arc<Equilibrium>,
     classes: SymmetryClasses,
     budget: Budget,
     table: Table,
@@ -71,10 +72,34 @@ impl Policy {
     /// # Errors
     /// [`EquilibriumError`] when the game has no equilibrium on [0, T], or the caller cancelled.
     pub fn new(game: Game, table_bytes: usize, cancel: &CancelToken) -> Result<Self, EquilibriumError> {
-        let equilibrium = riccati::solve(&game, cancel)?;
+        let equilibrium = Arc::new(riccati::solve(&game, cancel)?);
+        Ok(Self::with(game, equilibrium, table_bytes, cancel)?)
+    }
+
+    /// The same game and equilibrium with empty tables.
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory, or `cancel` was raised.
+    pub fn afresh(&self, cancel: &CancelToken) -> Result<Self, Stopped> {
+        Self::with(self.game.clone(), Arc::clone(&self.equilibrium), self.budget.capacity(), cancel)
+    }
+
+    /// Whether no thread is reading, writing or solving an entry. After a fork this is how a child finds out whether
+    /// the tables can be used, or one of its parent's threads holds what nobody will ever give back.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.table.is_idle() && self.transitions.is_idle()
+    }
+
+    fn with(
+        game: Game,
+        equilibrium: Arc<Equilibrium>,
+        table_bytes: usize,
+        cancel: &CancelToken,
+    ) -> Result<Self, Stopped> {
         let steps = game.grid().steps();
-        let (table, budget) = (Table::new(steps + 1), Budget::new(table_bytes));
-        let transitions = Transitions::new(steps, game.constrained(), game.size());
+        let (table, budget) = (Table::new(steps + 1, cancel)?, Budget::new(table_bytes));
+        let transitions = Transitions::new(steps, game.constrained(), game.size(), cancel)?;
         let classes = SymmetryClasses::of(&game);
         Ok(Self { game, equilibrium, classes, budget, table, transitions })
     }
@@ -111,9 +136,11 @@ impl Policy {
     }
 
     /// The synthesis problem at t_k.
-    #[must_use]
-    pub fn problem(&self, step: usize) -> Problem {
-        Problem::new(&self.game, self.equilibrium.node(step))
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    pub fn problem(&self, step: usize, cancel: &CancelToken) -> Result<Problem, Stopped> {
+        Problem::new(&self.game, self.equilibrium.node(step), cancel)
     }
 
     /// The feedback rows of the players that see everything, at t_k.
@@ -123,64 +150,87 @@ impl Policy {
     }
 
     /// The answer at (step, topology), from the table or solved now.
-    #[must_use]
-    pub fn at(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> Arc<StepPolicy> {
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    pub fn at(
+        &self,
+        step: usize,
+        topology: &Topology,
+        solver: &mut Synthesizer,
+        cancel: &CancelToken,
+    ) -> Result<Arc<StepPolicy>, Stopped> {
         if let Some(found) = self.table.get(step, topology) {
-            return found;
+            return Ok(found);
         }
-        let entry = Arc::new(self.solve(step, topology, solver));
+        let entry = Arc::new(self.solve(step, topology, solver, cancel)?);
         self.table.keep(step, topology, &entry, &self.budget);
-        entry
+        Ok(entry)
     }
 
     /// The gains of `problem`, one of this policy's, under a topology by any method, without looking at the table.
-    #[must_use]
-    pub fn gains(&self, problem: &Problem, topology: &Topology, options: Options, solver: &mut Synthesizer) -> Gains {
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for them, or the token that `solver` watches was raised.
+    pub fn gains(
+        &self,
+        problem: &Problem,
+        topology: &Topology,
+        options: Options,
+        solver: &mut Synthesizer,
+    ) -> Result<Gains, Stopped> {
         let (canonical, order) = self.classes.canonical(topology);
-        let gains = solver.solve(problem, &canonical, options);
-        Gains { rows: symmetry::back(&order, &gains.rows), ..gains }
+        let gains = solver.solve(problem, &canonical, options)?;
+        Ok(Gains { rows: symmetry::back(&order, &gains.rows)?, ..gains })
     }
 
     /// Solves (step, topology) without looking at the table.
-    #[must_use]
-    pub fn solve(&self, step: usize, topology: &Topology, solver: &mut Synthesizer) -> StepPolicy {
-        let (canonical, order) = self.classes.canonical(topology);
-        let n = self.game.size();
-        let gains = solver.solve(&self.problem(step), &canonical, Options::default());
-        let free = self.free_rows(step);
-        let mut c = vec![0.0; n * n];
-        closed_loop::matrix(&free, &gains.rows, &mut c);
-        let (mut transition, mut attacker) = (vec![0.0; n * n], vec![0.0; n]);
-        exponential::exponential(&c, &free.attacker, self.game.grid().step(), &mut transition, &mut attacker);
-        let mut own = vec![0.0; n];
-        order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
-        StepPolicy {
-            gains: Gains { rows: symmetry::back(&order, &gains.rows), ..gains },
-            transition: symmetry::back(&order, &transition),
-            attacker: own,
-        }
-    }
-    /// The table of transitions as bytes.
-    #[must_use]
-    pub fn save_transitions(&self) -> Vec<u8> {
-        saved::write(&self.transitions, &self.game)
-    }
-
-    /// The bytes of the saved table that begins with these, so that its size is known before it is read.
     ///
     /// # Errors
-    /// [`TableError`] for a beginning of no table, or of one that cannot be this game's.
-    pub fn transitions_length(&self, start: &[u8]) -> Result<u64, TableError> {
-        saved::length(start, &self.game, self.budget.capacity())
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    pub fn solve(
+        &self,
+        step: usize,
+        topology: &Topology,
+        solver: &mut Synthesizer,
+        cancel: &CancelToken,
+    ) -> Result<StepPolicy, Stopped> {
+        spare("the answers at all instants")?;
+        let (canonical, order) = self.classes.canonical(topology);
+        let n = self.game.size();
+        solver.watch(cancel);
+        let gains = solver.solve(&self.problem(step, cancel)?, &canonical, Options::default())?;
+        let free = self.free_rows(step);
+        let mut c = zeros(exponential::WHAT, n * n)?;
+        closed_loop::matrix(&free, &gains.rows, &mut c);
+        let (mut transition, mut attacker) = (zeros(exponential::WHAT, n * n)?, vec![0.0; n]);
+        let step = self.game.grid().step();
+        exponential::exponential(&c, &free.attacker, step, &mut transition, &mut attacker, cancel)?;
+        let mut own = vec![0.0; n];
+        order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
+        Ok(StepPolicy {
+            gains: Gains { rows: symmetry::back(&order, &gains.rows)?, ..gains },
+            transition: symmetry::back(&order, &transition)?,
+            attacker: own,
+        })
+    }
+
+    /// The table of transitions as bytes.
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for them, or `cancel` was raised.
+    pub fn save_transitions(&self, cancel: &CancelToken) -> Result<Vec<u8>, Stopped> {
+        saved::write(&self.transitions, &self.game, cancel)
     }
 
     /// Adds the entries of a saved table, as far as the budget goes; says how many there are now.
     ///
     /// # Errors
-    /// [`TableError`] for bytes that are no table, or one of another game, version or format; nothing is added then.
-    pub fn load_transitions(&self, bytes: &[u8]) -> Result<usize, TableError> {
+    /// [`TableError`] for bytes that are no table, or one of another game, version or format; nothing is added then. Also
+    /// when there is no memory for what they hold, or `cancel` was raised.
+    pub fn load_transitions(&self, bytes: &[u8], cancel: &CancelToken) -> Result<usize, TableError> {
         let (rows, size) = (self.game.constrained(), self.game.size());
-        saved::read(bytes, &self.game, self.budget.capacity(), |step, key, matrix| {
+        saved::read(bytes, &self.game, cancel, |step, key, matrix| {
             let canonical =
                 self.classes.any().then(|| self.classes.canonical(&Topology::from_words(rows, size, key)).0);
             self.transitions.keep(step, key, canonical.as_ref().map(Topology::words), matrix, &self.budget);

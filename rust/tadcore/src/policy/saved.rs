@@ -7,11 +7,15 @@
 
 use super::step_table::padded;
 use super::transitions::Transitions;
-use crate::error::TableError;
+use crate::cancel::CancelToken;
+use crate::error::{Stopped, TableError};
 use crate::game::{Game, Interaction};
+use crate::memory::{reserve, zeros};
 
 const MAGIC: &[u8; 8] = b"tadtable";
 const FORMAT: u32 = 2;
+/// Bytes, in whole entries, that are checked between two looks at the cancel token.
+const POLL: usize = 1 << 22;
 const HEADER: usize = 8 + 4 * 4 + 2 * 8;
 
 fn checksum(bytes: &[u8]) -> u64 {
@@ -84,7 +88,7 @@ impl Shape {
 }
 
 /// The table of transitions of a game as bytes.
-pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
+pub(super) fn write(transitions: &Transitions, game: &Game, cancel: &CancelToken) -> Result<Vec<u8>, Stopped> {
     let shape = Shape::of(game);
     let mut out = Vec::new();
     out.extend_from_slice(MAGIC);
@@ -99,8 +103,9 @@ pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
     for step in 0..shape.steps {
         let table = transitions.step_table(step);
         count += table.len() as u64;
-        out.reserve(table.len() * shape.entry);
         for (i, key) in table.keys().enumerate() {
+            cancel.check()?;
+            reserve("the table as bytes", &mut out, shape.entry + 8)?;
             out.extend_from_slice(&(step as u64).to_le_bytes());
             key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
             for column in table.matrix(i + 1).chunks_exact(padded(shape.size)) {
@@ -110,64 +115,52 @@ pub(super) fn write(transitions: &Transitions, game: &Game) -> Vec<u8> {
     }
     out[count_at..count_at + 8].copy_from_slice(&count.to_le_bytes());
     out.extend_from_slice(&checksum(&out).to_le_bytes());
-    out
+    Ok(out)
 }
 
-/// The bytes of the table that begins with these, of a game whose tables hold at most `capacity` bytes.
-///
-/// # Errors
-/// [`TableError`] for a beginning of no table, or of one of another game, format or size: what follows need not be read.
-pub(super) fn length(start: &[u8], game: &Game, capacity: usize) -> Result<u64, TableError> {
-    let shape = Shape::of(game);
-    if start.len() < HEADER || &start[..8] != MAGIC {
-        return Err(TableError::Foreign);
-    }
-    let mut reader = Reader(&start[8..]);
-    let format = reader.u32();
-    if format != FORMAT {
-        return Err(TableError::Format { found: format, expected: FORMAT });
-    }
-    let numbers = [reader.u32(), reader.u32(), reader.u32()];
-    let (identity, count) = (reader.u64(), reader.u64());
-    if numbers != shape.numbers() || identity != shape.identity.len() as u64 {
-        return Err(TableError::OtherGame);
-    }
-    // In memory an entry takes more than here.
-    let most = capacity / shape.entry;
-    if count > most as u64 {
-        return Err(TableError::TooMany { found: count, most });
-    }
-    Ok(HEADER as u64 + identity + count * shape.entry as u64 + 8)
-}
-
-/// Hands the entries of a saved table of at most `capacity` bytes to `each`: step, key and padded matrix.
+/// Hands the entries of a saved table to `each`: step, key and padded matrix.
 ///
 /// # Errors
 /// [`TableError`] for bytes that are no table, or one of another game, version or format; no entry is handed over then.
 pub(super) fn read(
     bytes: &[u8],
     game: &Game,
-    capacity: usize,
+    cancel: &CancelToken,
     mut each: impl FnMut(usize, &[u64], &[f64]),
 ) -> Result<(), TableError> {
-    if length(bytes, game, capacity)? != bytes.len() as u64 {
-        return Err(TableError::Damaged);
-    }
     let shape = Shape::of(game);
+    if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
+        return Err(TableError::Foreign);
+    }
+    let mut reader = Reader(&bytes[8..]);
+    let format = reader.u32();
+    if format != FORMAT {
+        return Err(TableError::Format { found: format, expected: FORMAT });
+    }
+    let numbers = [reader.u32(), reader.u32(), reader.u32()];
+    let (identity, count) = (reader.u64(), reader.u64());
     let (data, sum) = bytes.split_at(bytes.len() - 8);
     if Reader(sum).u64() != checksum(data) {
         return Err(TableError::Damaged);
     }
-    let Some(body) = data[HEADER..].strip_prefix(&shape.identity[..]) else {
+    let other = numbers != shape.numbers() || identity != shape.identity.len() as u64;
+    let Some(body) = data[HEADER..].strip_prefix(&shape.identity[..]).filter(|_| !other) else {
         return Err(TableError::OtherGame);
     };
-    let entries = body.chunks_exact(shape.entry);
-    if !entries.clone().all(|entry| shape.holds(entry)) {
+    if count.checked_mul(shape.entry as u64) != Some(body.len() as u64) {
         return Err(TableError::Damaged);
     }
+    // Nothing is handed over before all of it is known to be sound.
+    for entries in body.chunks(POLL.next_multiple_of(shape.entry)) {
+        cancel.check()?;
+        if !entries.chunks_exact(shape.entry).all(|entry| shape.holds(entry)) {
+            return Err(TableError::Damaged);
+        }
+    }
     let rows = padded(shape.size);
-    let (mut key, mut matrix) = (vec![0; shape.words], vec![0.0; shape.size * rows]);
-    for entry in entries {
+    let (mut key, mut matrix) = (vec![0; shape.words], zeros("a table", shape.size * rows)?);
+    for entry in body.chunks_exact(shape.entry) {
+        cancel.check()?;
         let mut reader = Reader(entry);
         let step = reader.u64() as usize;
         key.iter_mut().for_each(|word| *word = reader.u64());

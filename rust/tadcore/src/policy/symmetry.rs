@@ -14,7 +14,9 @@
 //! whom it sees, by whom it is seen, and the colours of those. Players that differ and have one colour all the same
 //! keep their order: the topology then shares with fewer others, and is none the worse for it.
 
+use crate::error::NoMemory;
 use crate::game::Game;
+use crate::memory::zeros;
 use crate::network::Topology;
 
 /// Rounds of refinement.
@@ -117,15 +119,15 @@ impl SymmetryClasses {
 }
 
 /// The rows of a canonical form, each as wide as `order` is long, under their own names.
-pub(super) fn back(order: &[usize], rows: &[f64]) -> Vec<f64> {
+pub(super) fn back(order: &[usize], rows: &[f64]) -> Result<Vec<f64>, NoMemory> {
     let n = order.len();
-    let mut out = vec![0.0; rows.len()];
+    let mut out = zeros("the answer at one instant", rows.len())?;
     for (i, row) in rows.chunks_exact(n).enumerate() {
         for (j, &x) in row.iter().enumerate() {
             out[order[i] * n + order[j]] = x;
         }
     }
-    out
+    Ok(out)
 }
 
 #[cfg(test)]

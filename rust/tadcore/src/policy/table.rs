@@ -6,10 +6,13 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, PoisonError, RwLock, TryLockError};
 
 use super::StepPolicy;
 use super::budget::Budget;
+use super::transitions::each;
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
 use crate::network::Topology;
 
 /// Bytes the tables of a game may hold unless told otherwise: 512 MiB, some two million transitions at n = 3.
@@ -42,13 +45,13 @@ pub(super) struct Table {
 }
 
 impl Table {
-    pub(super) fn new(count: usize) -> Self {
-        Self {
-            instants: (0..count).map(|_| StepAnswers::default()).collect(),
+    pub(super) fn new(count: usize, cancel: &CancelToken) -> Result<Self, Stopped> {
+        Ok(Self {
+            instants: each(count, StepAnswers::default, cancel)?,
             entries: AtomicUsize::new(0),
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
-        }
+        })
     }
 
     /// The entry, if it is held.
@@ -76,6 +79,11 @@ impl Table {
         } else {
             self.entries.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Whether no thread holds an instant.
+    pub(super) fn is_idle(&self) -> bool {
+        self.instants.iter().all(|answers| !matches!(answers.try_write(), Err(TryLockError::WouldBlock)))
     }
 
     pub(super) fn entries(&self) -> usize {

@@ -7,14 +7,28 @@
 
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, TryLockError};
 use std::time::Duration;
 
 use super::budget::Budget;
 use super::step_table::StepTable;
 use crate::cancel::CancelToken;
-use crate::error::Cancelled;
+use crate::error::{Cancelled, Stopped};
+use crate::memory::reserve;
 use crate::network::Topology;
+
+/// Something for each of `count` instants.
+pub(super) fn each<T>(count: usize, make: impl Fn() -> T, cancel: &CancelToken) -> Result<Vec<T>, Stopped> {
+    let mut all = Vec::new();
+    reserve("the empty tables of all instants", &mut all, count)?;
+    for k in 0..count {
+        if k % 65_536 == 0 {
+            cancel.check()?;
+        }
+        all.push(make());
+    }
+    Ok(all)
+}
 
 /// How long a thread waits for an entry that another one solves before it looks at its cancel token again.
 const PATIENCE: Duration = Duration::from_millis(20);
@@ -82,14 +96,14 @@ pub(crate) struct Transitions {
 }
 
 impl Transitions {
-    pub(super) fn new(steps: usize, rows: usize, size: usize) -> Self {
-        Self {
-            tables: (0..steps).map(|_| RwLock::new(StepTable::new(rows, size))).collect(),
-            claims: (0..steps).map(|_| Claims::default()).collect(),
+    pub(super) fn new(steps: usize, rows: usize, size: usize, cancel: &CancelToken) -> Result<Self, Stopped> {
+        Ok(Self {
+            tables: each(steps, || RwLock::new(StepTable::new(rows, size)), cancel)?,
+            claims: each(steps, Claims::default, cancel)?,
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
             entries: AtomicUsize::new(0),
-        }
+        })
     }
 
     /// The table of an instant, for reading.
@@ -100,6 +114,17 @@ impl Transitions {
     /// What threads are solving at an instant.
     pub(super) fn claims(&self, step: usize) -> &Claims {
         &self.claims[step]
+    }
+
+    /// Whether no thread holds an instant, and none solves an entry.
+    pub(super) fn is_idle(&self) -> bool {
+        let free = |table: &RwLock<StepTable>| !matches!(table.try_write(), Err(TryLockError::WouldBlock));
+        let unclaimed = |claims: &Claims| match claims.held.try_lock() {
+            Ok(held) => held.topologies.is_empty(),
+            Err(TryLockError::Poisoned(held)) => held.into_inner().topologies.is_empty(),
+            Err(TryLockError::WouldBlock) => false,
+        };
+        self.tables.iter().all(free) && self.claims.iter().all(unclaimed)
     }
 
     /// Entries held at all instants.
@@ -126,10 +151,16 @@ impl Transitions {
         if table.find(words) != 0 {
             return true;
         }
-        let kept = budget.take(table.entry_bytes(canonical.is_some()));
+        let bytes = table.entry_bytes(canonical.is_some());
+        if !budget.take(bytes) {
+            return false;
+        }
+        // What the system has no memory for is beyond the budget, too.
+        let kept = table.insert(words, canonical, matrix).is_ok();
         if kept {
-            table.insert(words, canonical, matrix);
             self.entries.fetch_add(1, Ordering::Relaxed);
+        } else {
+            budget.give(bytes);
         }
         kept
     }

@@ -28,6 +28,7 @@ use super::{finite, triangle, weight};
 use crate::cancel::CancelToken;
 use crate::error::EquilibriumError;
 use crate::game::Game;
+use crate::memory::zeros;
 use crate::simd::{Width, dispatch};
 
 /// Local error per step, in the weighted norm of [`dop853`]. Over 215 random games (n = 1…12, weights within two orders of
@@ -177,9 +178,9 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         7 => small!(7, 8, 4, 4),
         8 => small!(8, 8, 4, 4),
         _ => {
-            let mut panels = Vec::new();
+            let mut panels = zeros(dop853::WHAT, triangle::panels_len(n))?;
             let unpack = &mut |block: &[f64], out: &mut [f64]| triangle::unpack(width, n, block, &mut panels, out);
-            run(&mut Large::new(game, width), |i| triangle::entry(i, i), unpack, game, cancel, nodes)
+            run(&mut Large::new(game, width, cancel)?, |i| triangle::entry(i, i), unpack, game, cancel, nodes)
         }
     }
 }
@@ -201,7 +202,7 @@ fn run(
     nodes: &mut [f64],
 ) -> Result<usize, EquilibriumError> {
     let (n, grid, block) = (game.size(), game.grid(), flow.block_len());
-    let mut y0 = vec![0.0; 3 * block];
+    let mut y0 = zeros(dop853::WHAT, 3 * block)?;
     for (y, f) in y0.chunks_exact_mut(block).zip(game.state_weights(true)) {
         for (i, v) in f.into_iter().enumerate() {
             y[diagonal(i)] = v;
@@ -223,6 +224,10 @@ mod tests {
     use super::*;
     use crate::game::{Interaction, bank};
 
+    fn large(game: &Game, width: Width) -> Large {
+        Large::new(game, width, &CancelToken::new()).expect("memory")
+    }
+
     /// The solution has the same bits for every vector width.
     #[test]
     fn widths_agree_to_the_bit() -> Result<(), crate::error::GameError> {
@@ -235,9 +240,9 @@ mod tests {
         }
         for n in 8..=16 {
             let game = bank::varied_game(Interaction::I1, n, 1.0, 0.1)?;
-            let expected = values(Large::new(&game, Width::Baseline));
+            let expected = values(large(&game, Width::Baseline));
             for width in Width::all() {
-                assert_eq!(values(Large::new(&game, width)), expected, "n = {n}, {width:?}");
+                assert_eq!(values(large(&game, width)), expected, "n = {n}, {width:?}");
             }
         }
         macro_rules! small {
@@ -260,8 +265,7 @@ mod tests {
     #[test]
     fn large_and_small_agree() -> Result<(), crate::error::GameError> {
         let game = bank::varied_game(Interaction::I1, 6, 1.0, 0.1)?;
-        let (mut large, mut small) =
-            (Large::new(&game, Width::in_use()), Small::<7, 8, 4, 4>::new(&game, Width::in_use()));
+        let (mut large, mut small) = (large(&game, Width::in_use()), Small::<7, 8, 4, 4>::new(&game, Width::in_use()));
         let entry = |p: usize, i: usize, j: usize| ((1 + p + i.min(j) + 3 * i.max(j)) as f64).sin();
         let (block, whole) = (large.block_len(), small.block_len());
         let (mut y, mut y_whole) = (vec![0.0; 3 * block], vec![0.0; 3 * whole]);

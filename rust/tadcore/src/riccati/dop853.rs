@@ -19,14 +19,15 @@
 use super::escape;
 use super::stages::{self, DENSE, STAGES};
 use crate::cancel::CancelToken;
-use crate::error::EquilibriumError;
+use crate::error::{EquilibriumError, NoMemory};
+use crate::memory::{MOST_BYTES, within};
 use crate::simd::{Aligned, Width};
 
 /// Attempted steps after which the integrator gives up. A game that needs more is stiff (a rate some 10⁶ times the
 /// inverse of the horizon), not escaping; ordinary games take some hundred steps, the wildest seen 10⁴.
 const STEP_BUDGET: usize = 300_000;
-/// Attempts between two polls of the cancel token.
-const POLL: usize = 64;
+/// What asks for memory here.
+pub(super) const WHAT: &str = "the integration of the Riccati equations";
 /// Distance to a pole, relative to s, at which it is reported.
 const RESOLVED: f64 = 1e-15;
 /// Nodes of the grid that are interpolated together.
@@ -39,7 +40,7 @@ const GROW: f64 = 6.0;
 pub(super) trait Flow {
     /// Entries of one block, padding included: a multiple of [`stages::LANES`].
     fn block_len(&self) -> usize;
-    /// dy/ds at `y`; the padding of `dy` is left at zero.
+    /// dy/ds at `y`; the padding of `dy` is left at zero. Large flows leave it unfinished once their token is raised.
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]);
     /// Writes the weights of the error norm for one block into `out`.
     fn weigh(&mut self, y: &[f64], out: &mut [f64]);
@@ -58,20 +59,22 @@ struct Workspace {
 }
 
 impl Workspace {
-    fn new(y0: &[f64], block: usize) -> Self {
+    fn new(y0: &[f64], block: usize) -> Result<Self, NoMemory> {
         let len = y0.len();
-        let mut y = Aligned::zeros(len);
+        let all = (2 + TOGETHER + STAGES + DENSE) as u128 * len as u128;
+        within(WHAT, all * size_of::<f64>() as u128, MOST_BYTES)?;
+        let mut y = Aligned::zeros(WHAT, len)?;
         y.copy_from_slice(y0);
-        Self {
+        Ok(Self {
             width: Width::in_use(),
             len,
             block,
             y,
-            y_new: Aligned::zeros(len),
-            point: Aligned::zeros(TOGETHER * len),
-            k: Aligned::zeros(STAGES * len),
-            dense: Aligned::zeros(DENSE * len),
-        }
+            y_new: Aligned::zeros(WHAT, len)?,
+            point: Aligned::zeros(WHAT, TOGETHER * len)?,
+            k: Aligned::zeros(WHAT, STAGES * len)?,
+            dense: Aligned::zeros(WHAT, DENSE * len)?,
+        })
     }
 
     fn stage(&self, i: usize) -> &[f64] {
@@ -149,7 +152,7 @@ pub(super) fn integrate(
     cancel: &CancelToken,
     sink: &mut dyn FnMut(usize, &[f64]),
 ) -> Result<usize, EquilibriumError> {
-    let mut w = Workspace::new(y0, flow.block_len());
+    let mut w = Workspace::new(y0, flow.block_len())?;
     // The last node is the horizon itself, however the quotient rounds: it is delivered by the step that ends there.
     let node = |j: usize| if j < steps { j as f64 * horizon / steps as f64 } else { horizon };
     sink(0, y0);
@@ -159,9 +162,6 @@ pub(super) fn integrate(
     let (mut s, mut low) = (0.0_f64, 0.0_f64);
     let (mut next, mut accepted, mut attempts, mut rejected) = (1, 0, 0, false);
     while next <= steps {
-        if attempts % POLL == 0 {
-            cancel.check()?;
-        }
         let left = (horizon - s) - low;
         let last = 1.01 * h >= left;
         if last {
@@ -172,6 +172,8 @@ pub(super) fn integrate(
         }
         attempts += 1;
         let err = w.attempt(flow, h) / tolerance;
+        // A flow that noticed it, too, has left its derivative unfinished.
+        cancel.check()?;
         let factor = SAFETY / err.sqrt().sqrt().sqrt();
         // A trial that overflowed has an error that is not a number.
         if err.is_nan() || err > 1.0 {
@@ -181,6 +183,7 @@ pub(super) fn integrate(
         }
         accepted += 1;
         w.finish(flow);
+        cancel.check()?;
         let (reached, reached_low) = if last { (horizon, 0.0) } else { two_sum(s, low + h) };
         if last || h < escape::GATE * reached {
             escape::check(reached, w.growth(), horizon, RESOLVED)?;
@@ -188,6 +191,7 @@ pub(super) fn integrate(
         if node(next) <= reached {
             if !(last && next == steps) {
                 w.prepare_dense(flow, h);
+                cancel.check()?;
             }
             while next <= steps && node(next) <= reached {
                 if last && next == steps {
@@ -251,7 +255,7 @@ mod tests {
     /// Errors of one step from 0.1: at its end and, by the dense output, the largest inside.
     fn errors(h: f64) -> (f64, f64) {
         let start = 0.1_f64;
-        let mut w = Workspace::new(&[start.tan(); 8], 8);
+        let mut w = Workspace::new(&[start.tan(); 8], 8).expect("memory");
         Tangent.derivative(&[start.tan(); 8], &mut w.k[..8]);
         w.attempt(&mut Tangent, h);
         w.finish(&mut Tangent);
@@ -280,7 +284,7 @@ mod tests {
     fn the_error_estimate_has_order_eight() {
         let estimate = |h: f64| {
             let start = 0.1_f64;
-            let mut w = Workspace::new(&[start.tan(); 8], 8);
+            let mut w = Workspace::new(&[start.tan(); 8], 8).expect("memory");
             Tangent.derivative(&[start.tan(); 8], &mut w.k[..8]);
             w.attempt(&mut Tangent, h)
         };

@@ -23,9 +23,10 @@
 //! Source: eq:RDE of the paper, with the sign of time reversed; the bound is ours.
 
 use super::escape;
-use crate::cancel::CancelToken;
-use crate::error::EquilibriumError;
+use crate::cancel::{CancelToken, raised};
+use crate::error::{EquilibriumError, NoMemory, Stopped};
 use crate::game::Game;
+use crate::memory::zeros;
 use crate::simd::{Width, widened};
 
 /// Largest bound on ‖X − I‖ for which a step is taken.
@@ -36,8 +37,12 @@ const LEVELS: usize = 128;
 const RESOLVED: f64 = 1e-13;
 /// Steps beyond one per grid interval after which the solver gives up.
 const STEP_BUDGET: usize = 20_000_000;
+/// What asks for memory here.
+const WHAT: &str = "the solution of the Riccati equation";
 /// Steps between two polls of the cancel token.
 const POLL: usize = 256;
+/// N beyond which it is looked at in every step, and within.
+const SMALL: usize = 8;
 
 /// What a step of one length needs; matrices in rows, N × N.
 struct Level {
@@ -64,7 +69,7 @@ struct Flow {
 }
 
 impl Flow {
-    fn new(game: &Game) -> Self {
+    fn new(game: &Game) -> Result<Self, NoMemory> {
         let weights = game.weights();
         let n = game.size();
         let inverse: Vec<f64> = weights.r_d.iter().chain([&weights.r_tau]).map(|r| 1.0 / r).collect();
@@ -83,42 +88,43 @@ impl Flow {
             step: game.grid().step(),
         };
         // ‖SQ‖₁: the largest column sum
-        let s = flow.s();
+        let s = flow.s()?;
         let column = |j: usize| (0..n).map(|i| s[i * n + j].abs()).sum::<f64>() * flow.q[j].abs();
         flow.omega = (0..n).map(column).fold(0.0, f64::max).sqrt();
-        flow
+        Ok(flow)
     }
 
-    fn s(&self) -> Vec<f64> {
+    fn s(&self) -> Result<Vec<f64>, NoMemory> {
         let n = self.n;
-        let mut s: Vec<f64> = (0..n * n).map(|ij| self.w[ij / n] * self.w[ij % n]).collect();
+        let mut s = zeros(WHAT, n * n)?;
+        s.iter_mut().enumerate().for_each(|(ij, s)| *s = self.w[ij / n] * self.w[ij % n]);
         for i in 0..n {
             s[i * n + i] += self.s_diagonal[i];
         }
-        s
+        Ok(s)
     }
 
     /// The exponential of the Hamiltonian matrix over δ 2⁻ʲ, if the bound allows that length for any P at all.
-    fn make_level(&self, j: usize) -> Level {
+    fn make_level(&self, j: usize, cancel: &CancelToken) -> Result<Level, Stopped> {
         let n = self.n;
         let h = self.step * (-(j as f64)).exp2();
         let x = self.omega * h;
         let bound = (2.0 * (0.5 * x).sinh().powi(2), if x > 0.0 { x.sinh() / self.omega } else { h });
-        let mut level = Level { bound, c: vec![0.0; n * n], e: vec![0.0; n * n], f: vec![0.0; n * n] };
+        let mut level = Level { bound, c: Vec::new(), e: Vec::new(), f: Vec::new() };
         if bound.0 > BOUND {
-            return level;
+            return Ok(level);
         }
         // Power series in h² SQ, whose norm is below one here.
-        let s = self.s();
-        let mut power = vec![0.0; n * n];
-        let mut sinhc = vec![0.0; n * n];
+        let s = self.s()?;
+        let (mut power, mut sinhc) = (zeros(WHAT, n * n)?, zeros(WHAT, n * n)?);
+        level.c = zeros(WHAT, n * n)?;
         for i in 0..n {
             power[i * n + i] = 1.0;
             sinhc[i * n + i] = 1.0;
         }
         for k in 1..=10 {
             // power ← h² (power S) Q / ((2k − 1) 2k)
-            let product = multiply(n, &power, &s);
+            let product = multiply(n, &power, &s, cancel)?;
             let factor = h * h / f64::from((2 * k - 1) * 2 * k);
             for (ij, p) in power.iter_mut().enumerate() {
                 *p = product[ij] * self.q[ij % n] * factor;
@@ -128,11 +134,13 @@ impl Flow {
                 sinhc[ij] += power[ij] / f64::from(2 * k + 1);
             }
         }
-        level.e = multiply(n, &sinhc, &s).iter().map(|v| v * h).collect();
-        level.f = (0..n * n).map(|ij| self.q[ij / n] * sinhc[ij] * h).collect();
+        level.e = multiply(n, &sinhc, &s, cancel)?;
+        level.e.iter_mut().for_each(|v| *v *= h);
+        level.f = sinhc;
+        level.f.iter_mut().enumerate().for_each(|(ij, v)| *v = self.q[ij / n] * *v * h);
         symmetrise(n, &mut level.e);
         symmetrise(n, &mut level.f);
-        level
+        Ok(level)
     }
 
     /// ‖SP‖₁ for the balanced P.
@@ -149,31 +157,35 @@ impl Flow {
     }
 
     /// dP/ds = Q − P S P.
-    fn derivative(&self, p: &[f64]) -> Vec<f64> {
+    fn derivative(&self, p: &[f64], cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
         let n = self.n;
         let v: Vec<f64> = p.chunks_exact(n).map(|row| row.iter().zip(&self.w).map(|(p, w)| p * w).sum()).collect();
-        let mut out = vec![0.0; n * n];
+        let mut out = zeros(WHAT, n * n)?;
         for i in 0..n {
+            cancel.check()?;
             for j in 0..n {
-                let sum: f64 = (0..n).map(|k| p[i * n + k] * self.s_diagonal[k] * p[k * n + j]).sum();
+                // Row j is column j, as P is symmetric.
+                let rows = p[i * n..][..n].iter().zip(&self.s_diagonal).zip(&p[j * n..][..n]);
+                let sum: f64 = rows.map(|((left, s), right)| left * s * right).sum();
                 out[i * n + j] = -(sum + v[i] * v[j]);
             }
             out[i * n + i] += self.q[i];
         }
-        out
+        Ok(out)
     }
 }
 
-fn multiply(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; n * n];
+fn multiply(n: usize, a: &[f64], b: &[f64], cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
+    let mut out = zeros(WHAT, n * n)?;
     for i in 0..n {
+        cancel.check()?;
         for k in 0..n {
             for j in 0..n {
                 out[i * n + j] += a[i * n + k] * b[k * n + j];
             }
         }
     }
-    out
+    Ok(out)
 }
 
 fn symmetrise(n: usize, a: &mut [f64]) {
@@ -186,13 +198,16 @@ fn symmetrise(n: usize, a: &mut [f64]) {
     }
 }
 
-/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch.
+/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch. Once `cancel` is raised P is left unfinished.
 #[inline(always)]
-fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
+fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64], cancel: Option<&CancelToken>) {
     let (c, e, f) = (&level.c[..n * n], &level.e[..n * n], &level.f[..n * n]);
     let (p, z, g) = (&mut p[..n * n], &mut z[..n * n], &mut g[..n * n]);
     // Zᵀ = Cᵀ + P E in `z`; then Gᵀ = F + P C − Zᵀ P in `g`, so that the increment solves Xᵀ (ΔP)ᵀ = Gᵀ.
     for i in 0..n {
+        if raised(cancel) {
+            return;
+        }
         for j in 0..n {
             z[i * n + j] = c[j * n + i];
             g[i * n + j] = f[i * n + j];
@@ -214,6 +229,9 @@ fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64])
     }
     // Elimination without pivoting: ‖Z‖₁ ≤ ½.
     for k in 0..n {
+        if raised(cancel) {
+            return;
+        }
         let pivot = 1.0 / z[k * n + k];
         let (above, below) = z.split_at_mut((k + 1) * n);
         let (g_above, g_below) = g.split_at_mut((k + 1) * n);
@@ -229,6 +247,9 @@ fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64])
         }
     }
     for k in (0..n).rev() {
+        if raised(cancel) {
+            return;
+        }
         let pivot = 1.0 / z[k * n + k];
         let (above, below) = g.split_at_mut((k + 1) * n);
         let row = &mut above[k * n..];
@@ -255,48 +276,55 @@ fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64])
 widened! {
     #[inline(never)]
     fn advance_small<V, const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
-        advance(N, level, p, z, g);
+        advance(N, level, p, z, g, None);
     }
 }
 
 widened! {
     #[inline(never)]
-    fn advance_large<V>(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
-        advance(n, level, p, z, g);
+    fn advance_large<V>(
+        n: usize,
+        level: &Level,
+        p: &mut [f64],
+        z: &mut [f64],
+        g: &mut [f64],
+        cancel: Option<&CancelToken>,
+    ) {
+        advance(n, level, p, z, g, cancel);
     }
 }
 
 /// Solves eq:RDE backward over the grid of `game`, writing N × N matrices into `nodes`, one after the other. Returns
 /// the number of steps.
 pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
-    let mut flow = Flow::new(game);
+    let mut flow = Flow::new(game)?;
     let (n, grid, width) = (flow.n, game.grid(), Width::in_use());
     let (horizon, steps) = (grid.horizon(), grid.steps());
-    let mut p = vec![0.0; n * n];
+    let mut p = zeros(WHAT, n * n)?;
     for (i, f) in game.state_weights(true)[0].iter().enumerate() {
         p[i * n + i] = f * flow.balance[i] * flow.balance[i];
     }
-    let (mut z, mut g) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let (mut z, mut g) = (zeros(WHAT, n * n)?, zeros(WHAT, n * n)?);
     let (mut taken, mut j) = (0, 0_usize);
     write(&flow, &p, &mut nodes[steps * n * n..]);
     for k in 1..=steps {
         // The part of this interval already covered, a sum of powers of two.
         let mut done = 0.0_f64;
         while done < 1.0 {
-            if taken % POLL == 0 {
+            if taken % POLL == 0 || n > SMALL {
                 cancel.check()?;
             }
             let norm = flow.norm_sp(&p);
             j = j.saturating_sub(1);
-            while !fits(&mut flow, j, norm, 1.0 - done) {
+            while !fits(&mut flow, j, norm, 1.0 - done, cancel)? {
                 j += 1;
                 let s = grid.time(k - 1) + done * flow.step;
                 if j >= LEVELS || taken > steps + STEP_BUDGET || !norm.is_finite() {
-                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p, cancel)?), horizon, RESOLVED)?;
                     return Err(EquilibriumError::StepBudget { steps: taken, reached: s, horizon });
                 }
                 if flow.step * (-(j as f64)).exp2() < escape::GATE * s {
-                    escape::check(s, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+                    escape::check(s, escape::growth(&p, &flow.derivative(&p, cancel)?), horizon, RESOLVED)?;
                 }
             }
             if let Some(level) = &flow.levels[j] {
@@ -308,7 +336,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
                     6 => advance_small::<6>(width, level, &mut p, &mut z, &mut g),
                     7 => advance_small::<7>(width, level, &mut p, &mut z, &mut g),
                     8 => advance_small::<8>(width, level, &mut p, &mut z, &mut g),
-                    _ => advance_large(width, n, level, &mut p, &mut z, &mut g),
+                    _ => advance_large(width, n, level, &mut p, &mut z, &mut g, Some(cancel)),
                 }
             }
             taken += 1;
@@ -316,19 +344,19 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
         }
         write(&flow, &p, &mut nodes[(steps - k) * n * n..]);
     }
-    escape::check(horizon, escape::growth(&p, &flow.derivative(&p)), horizon, RESOLVED)?;
+    escape::check(horizon, escape::growth(&p, &flow.derivative(&p, cancel)?), horizon, RESOLVED)?;
     Ok(taken)
 }
 
 /// Whether a step of δ 2⁻ʲ stays inside the interval and provably away from every pole.
-fn fits(flow: &mut Flow, j: usize, norm: f64, left: f64) -> bool {
+fn fits(flow: &mut Flow, j: usize, norm: f64, left: f64, cancel: &CancelToken) -> Result<bool, Stopped> {
     if j >= LEVELS || (-(j as f64)).exp2() > left {
-        return false;
+        return Ok(false);
     }
     if flow.levels[j].is_none() {
-        flow.levels[j] = Some(flow.make_level(j));
+        flow.levels[j] = Some(flow.make_level(j, cancel)?);
     }
-    flow.levels[j].as_ref().is_some_and(|level| level.bound.0 + norm * level.bound.1 <= BOUND)
+    Ok(flow.levels[j].as_ref().is_some_and(|level| level.bound.0 + norm * level.bound.1 <= BOUND))
 }
 
 /// Undoes the balancing.
@@ -350,7 +378,7 @@ mod tests {
     #[test]
     fn the_norm_of_the_product_is_that_of_the_dense_one() -> Result<(), crate::error::GameError> {
         let game = bank::varied_game(Interaction::I2, 3, 1.0, 0.1)?;
-        let (flow, w, n) = (Flow::new(&game), game.weights(), 4);
+        let (flow, w, n) = (Flow::new(&game).expect("memory"), game.weights(), 4);
         let r = [w.r_d[0], w.r_d[1], w.r_d[2], w.r_tau];
         for seed in 0..20 {
             let p: Vec<f64> =

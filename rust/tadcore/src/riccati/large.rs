@@ -17,9 +17,11 @@
 //!
 //! Source: eq:Riccati of the paper as in [`super::coupled`]; the tiles are ours, by measurement.
 
-use super::dop853::Flow;
+use super::dop853::{self, Flow};
 use super::triangle::{self, PANEL, TILE};
 use super::weight;
+use crate::cancel::{CancelToken, raised};
+use crate::error::NoMemory;
 use crate::game::Game;
 use crate::simd::{Aligned, Number, Simd, Width, dispatch};
 
@@ -36,26 +38,29 @@ pub(super) struct Large {
     p: [Aligned; 3],
     m: Aligned,
     sizes: Vec<f64>,
+    cancel: CancelToken,
 }
 
 impl Large {
-    pub(super) fn new(game: &Game, width: Width) -> Self {
+    pub(super) fn new(game: &Game, width: Width, cancel: &CancelToken) -> Result<Self, NoMemory> {
         let (w, n) = (game.weights(), game.size());
         let tiles = triangle::tiles(n);
         // With room for row N.
         let height = TILE * (tiles + 1);
         let len = tiles.div_ceil(2) * height * PANEL;
-        Self {
+        let zeros = || Aligned::zeros(dop853::WHAT, len);
+        Ok(Self {
             width,
             n,
             tiles,
             height,
             q: game.state_weights(false),
             scales: w.r_d.iter().chain([&w.r_tau, &w.r_a]).map(|r| -1.0 / r).collect(),
-            p: std::array::from_fn(|_| Aligned::zeros(len)),
-            m: Aligned::zeros(len),
+            p: [zeros()?, zeros()?, zeros()?],
+            m: zeros()?,
             sizes: vec![0.0; TILE * tiles],
-        }
+            cancel: cancel.clone(),
+        })
     }
 
     #[inline(always)]
@@ -83,7 +88,8 @@ impl Large {
             self.scale(own, 0.5);
             let out = &mut dy[p * block..(p + 1) * block];
             let once = if own.is_none() { n - 1 } else { 0 };
-            Update { p: rows(&self.p[p]), m: rows(&self.m), height, terms: n + 1, once }.lower::<V>(tiles, out);
+            let cancel = Some(&self.cancel);
+            Update { p: rows(&self.p[p]), m: rows(&self.m), height, terms: n + 1, once, cancel }.lower::<V>(tiles, out);
             self.scale(own, 2.0);
             for (i, q) in self.q[p].iter().enumerate() {
                 out[triangle::entry(i, i)] += q;
@@ -129,6 +135,7 @@ struct Update<'a> {
     height: usize,
     terms: usize,
     once: usize,
+    cancel: Option<&'a CancelToken>,
 }
 
 impl<'a> Update<'a> {
@@ -138,6 +145,9 @@ impl<'a> Update<'a> {
         let out = &mut out.as_chunks_mut::<TILE>().0.as_chunks_mut::<TILE>().0[..triangle::len(tiles) / (TILE * TILE)];
         let mut i = 0;
         while i < tiles {
+            if raised(self.cancel) {
+                return;
+            }
             let panel = i / 2;
             if V::ROWS == 8 && i + 2 <= tiles {
                 for j in 0..panel {

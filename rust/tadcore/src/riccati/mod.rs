@@ -43,8 +43,9 @@ mod triangle;
 mod weight;
 
 use crate::cancel::CancelToken;
-use crate::error::EquilibriumError;
+use crate::error::{EquilibriumError, Stopped};
 use crate::game::{Game, Interaction};
+use crate::memory::zeros;
 
 /// The solution of a game's Riccati equations on its grid.
 ///
@@ -66,8 +67,7 @@ pub struct Equilibrium {
 /// when its numbers or its grid are too large, [`EquilibriumError::Cancelled`] when `cancel` was raised.
 pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, EquilibriumError> {
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
-    let numbers = (steps + 1) * groups(interaction) * size * size;
-    let mut nodes = zeros(numbers)?;
+    let mut nodes = zeros("P on the grid", (steps + 1) * groups(interaction) * size * size)?;
     let integrator_steps = match interaction {
         Interaction::I1 => coupled::solve(game, cancel, &mut nodes)?,
         Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,
@@ -76,12 +76,6 @@ pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, Equilibri
         return Err(EquilibriumError::Range);
     }
     Ok(Equilibrium { interaction, size, steps, integrator_steps, nodes })
-}
-
-/// Memory that the system hands out zeroed, or a refusal where a plain allocation would end the process.
-fn zeros(numbers: usize) -> Result<Vec<f64>, EquilibriumError> {
-    bytemuck::try_zeroed_vec(numbers)
-        .map_err(|()| EquilibriumError::Memory { bytes: numbers.saturating_mul(size_of::<f64>()) })
 }
 
 /// Whether all numbers are.
@@ -181,8 +175,10 @@ impl Equilibrium {
     /// with the right-hand side of eq:Riccati or eq:RDE evaluated as printed, relative to the norms of its terms. Where
     /// it does not, the node is compared with a fresh integration of the printed equation over one step. At t_K the
     /// terminal condition is compared as well. About 1e-12 to 1e-9 for a good solution.
-    #[must_use]
-    pub fn residual(&self, game: &Game) -> Vec<f64> {
-        residual::residual(self, game)
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory, or `cancel` was raised.
+    pub fn residual(&self, game: &Game, cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
+        residual::residual(self, game, cancel)
     }
 }

@@ -23,7 +23,9 @@ use super::dop853::{self, Flow};
 use super::stages::LANES;
 use super::weight;
 use crate::cancel::CancelToken;
+use crate::error::Stopped;
 use crate::game::{Game, Interaction};
+use crate::memory::{reserve, zeros};
 
 /// Nodes of a difference.
 const POINTS: usize = 9;
@@ -37,8 +39,12 @@ const ROUNDING: f64 = 1e-8;
 /// Tolerance of a fresh integration.
 const TOLERANCE: f64 = 1e-13;
 
+/// What asks for memory here.
+const WHAT: &str = "the residual of the Riccati equations";
+
 /// The printed equations.
 struct Textbook {
+    cancel: CancelToken,
     n: usize,
     interaction: Interaction,
     s: Vec<Vec<f64>>,
@@ -55,58 +61,91 @@ struct Evaluation {
 }
 
 impl Textbook {
-    fn new(game: &Game) -> Self {
+    fn new(game: &Game, cancel: &CancelToken) -> Result<Self, Stopped> {
         let (n, w) = (game.size(), game.weights());
-        let diagonal = |d: &[f64]| {
-            let mut m = vec![0.0; n * n];
+        let diagonal = |d: &[f64]| -> Result<Vec<f64>, Stopped> {
+            let mut m = zeros(WHAT, n * n)?;
             for (i, v) in d.iter().enumerate() {
                 m[i * n + i] = *v;
             }
-            m
+            Ok(m)
         };
         let mut inverse: Vec<f64> = w.r_d.iter().map(|r| 1.0 / r).collect();
         inverse.push(0.0);
-        let s_d = diagonal(&inverse);
+        let s_d = diagonal(&inverse)?;
         let mut last = vec![0.0; n];
         last[n - 1] = 1.0 / w.r_tau;
-        let s_tau = diagonal(&last);
-        let s_a = vec![1.0 / w.r_a; n * n];
+        let s_tau = diagonal(&last)?;
+        let mut s_a = zeros(WHAT, n * n)?;
+        s_a.fill(1.0 / w.r_a);
         let s = match game.interaction() {
             Interaction::I1 => vec![s_d, s_tau, s_a],
-            Interaction::I2 => vec![(0..n * n).map(|i| s_a[i] - s_d[i] - s_tau[i]).collect()],
+            Interaction::I2 => {
+                s_a.iter_mut().zip(s_d.iter().zip(&s_tau)).for_each(|(a, (d, tau))| *a = *a - d - tau);
+                vec![s_a]
+            }
         };
-        let q = game.state_weights(false).iter().map(|q| diagonal(q)).collect();
-        Self { n, interaction: game.interaction(), s, q, block: (n * n).next_multiple_of(LANES) }
+        let q = game.state_weights(false).iter().map(|q| diagonal(q)).collect::<Result<_, Stopped>>()?;
+        Ok(Self {
+            cancel: cancel.clone(),
+            n,
+            interaction: game.interaction(),
+            s,
+            q,
+            block: (n * n).next_multiple_of(LANES),
+        })
     }
 
     /// A = Σ S P.
-    fn closed_loop(&self, p: &[&[f64]]) -> Vec<f64> {
-        let mut a = vec![0.0; self.n * self.n];
+    fn closed_loop(&self, p: &[&[f64]]) -> Result<Vec<f64>, Stopped> {
+        let mut a = zeros(WHAT, self.n * self.n)?;
         for (s, p) in self.s.iter().zip(p) {
-            for (a, v) in a.iter_mut().zip(multiply(self.n, s, p)) {
+            for (a, v) in a.iter_mut().zip(self.multiply(s, p)?) {
                 *a += v;
             }
         }
-        a
+        Ok(a)
+    }
+
+    fn multiply(&self, a: &[f64], b: &[f64]) -> Result<Vec<f64>, Stopped> {
+        let n = self.n;
+        let mut out = zeros(WHAT, n * n)?;
+        for (row, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
+            self.cancel.check()?;
+            for (a, b) in a.iter().zip(b.chunks_exact(n)).filter(|(a, _)| **a != 0.0) {
+                for (o, b) in row.iter_mut().zip(b) {
+                    *o += a * b;
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn transpose(&self, a: &[f64]) -> Result<Vec<f64>, Stopped> {
+        let n = self.n;
+        let mut out = zeros(WHAT, n * n)?;
+        out.iter_mut().enumerate().for_each(|(ij, x)| *x = a[(ij % n) * n + ij / n]);
+        Ok(out)
     }
 
     /// How fast the equation can change its solution: 2‖A‖ + (‖S‖ ‖Q‖)^½.
-    fn rate(&self, p: &[&[f64]]) -> f64 {
+    fn rate(&self, p: &[&[f64]]) -> Result<f64, Stopped> {
         let largest = |m: &[Vec<f64>]| m.iter().map(|m| norm(m)).fold(0.0, f64::max);
-        2.0 * norm(&self.closed_loop(p)) + (largest(&self.s) * largest(&self.q)).sqrt()
+        Ok(2.0 * norm(&self.closed_loop(p)?) + (largest(&self.s) * largest(&self.q)).sqrt())
     }
 
     /// `p`: one N × N matrix per group.
-    fn evaluate(&self, p: &[&[f64]]) -> Evaluation {
+    fn evaluate(&self, p: &[&[f64]]) -> Result<Evaluation, Stopped> {
         let n = self.n;
-        let a = self.closed_loop(p);
+        let a = self.closed_loop(p)?;
         let (mut derivative, mut scale) = (Vec::new(), Vec::new());
+        reserve(WHAT, &mut derivative, p.len() * n * n)?;
         for ((p, s), q) in p.iter().zip(&self.s).zip(&self.q) {
-            let psp = multiply(n, &multiply(n, p, s), p);
+            let psp = self.multiply(&self.multiply(p, s)?, p)?;
             match self.interaction {
                 Interaction::I1 => {
-                    let pa = multiply(n, p, &a);
-                    let ap = multiply(n, &transpose(n, &a), p);
+                    let pa = self.multiply(p, &a)?;
+                    let ap = self.multiply(&self.transpose(&a)?, p)?;
                     derivative.extend((0..n * n).map(|i| q[i] - pa[i] - ap[i] + psp[i]));
                     scale.push(norm(q) + 2.0 * norm(&pa) + norm(&psp));
                 }
@@ -116,7 +155,7 @@ impl Textbook {
                 }
             }
         }
-        Evaluation { derivative, scale }
+        Ok(Evaluation { derivative, scale })
     }
 }
 
@@ -127,7 +166,8 @@ impl Flow for Textbook {
     fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
         let len = self.n * self.n;
         let p: Vec<&[f64]> = y.chunks_exact(self.block).map(|b| &b[..len]).collect();
-        let value = self.evaluate(&p);
+        // Without an answer no step is accepted.
+        let Ok(value) = self.evaluate(&p) else { return dy.fill(f64::NAN) };
         for (out, d) in dy.chunks_exact_mut(self.block).zip(value.derivative.chunks_exact(len)) {
             for i in 0..self.n {
                 for j in 0..self.n {
@@ -140,22 +180,6 @@ impl Flow for Textbook {
         let len = self.n * self.n;
         weight::whole(&y[..len], self.n, &mut vec![0.0; self.n], &mut out[..len]);
     }
-}
-
-fn multiply(n: usize, a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; n * n];
-    for (row, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
-        for (a, b) in a.iter().zip(b.chunks_exact(n)).filter(|(a, _)| **a != 0.0) {
-            for (o, b) in row.iter_mut().zip(b) {
-                *o += a * b;
-            }
-        }
-    }
-    out
-}
-
-fn transpose(n: usize, a: &[f64]) -> Vec<f64> {
-    (0..n * n).map(|ij| a[(ij % n) * n + ij / n]).collect()
 }
 
 fn norm(a: &[f64]) -> f64 {
@@ -218,20 +242,20 @@ impl Stencil {
 }
 
 /// See [`Equilibrium::residual`].
-pub(super) fn residual(equilibrium: &Equilibrium, game: &Game) -> Vec<f64> {
+pub(super) fn residual(equilibrium: &Equilibrium, game: &Game, cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
     let (n, steps, groups) = (equilibrium.size(), equilibrium.steps(), equilibrium.groups());
     let (len, step) = (n * n, game.grid().step());
-    let mut book = Textbook::new(game);
+    let mut book = Textbook::new(game, cancel)?;
     let terminal = game.state_weights(true);
     let weights: [[f64; POINTS]; POINTS] = std::array::from_fn(difference);
-    let mut rates = Vec::with_capacity(steps + 1);
-    for k in 0..=steps {
-        rates.push(book.rate(&node(equilibrium, k)));
+    let mut rates = zeros(WHAT, steps + 1)?;
+    for (k, rate) in rates.iter_mut().enumerate() {
+        *rate = book.rate(&node(equilibrium, k))?;
     }
-    let mut out = vec![0.0; groups * (steps + 1)];
+    let mut out = zeros(WHAT, groups * (steps + 1))?;
     for k in 0..=steps {
         let p = node(equilibrium, k);
-        let value = book.evaluate(&p);
+        let value = book.evaluate(&p)?;
         let stencil = Stencil::about(k, step, &rates);
         let fresh = if stencil.is_none() && k < steps { again(&mut book, equilibrium, k, step) } else { None };
         for g in 0..groups {
@@ -260,7 +284,8 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game) -> Vec<f64> {
             out[g * (steps + 1) + k] = worst;
         }
     }
-    out
+    cancel.check()?;
+    Ok(out)
 }
 
 fn node(equilibrium: &Equilibrium, k: usize) -> Vec<&[f64]> {
@@ -280,6 +305,7 @@ fn again(book: &mut Textbook, equilibrium: &Equilibrium, k: usize, step: f64) ->
             last = Some(y.to_vec());
         }
     };
-    dop853::integrate(book, &y, step, 1, TOLERANCE, &CancelToken::new(), keep).ok()?;
+    let cancel = book.cancel.clone();
+    dop853::integrate(book, &y, step, 1, TOLERANCE, &cancel, keep).ok()?;
     last
 }

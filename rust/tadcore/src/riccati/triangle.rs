@@ -63,11 +63,15 @@ fn put<V: Simd>(tile: [V::Four; TILE], rows: &mut [[f64; TILE]; PANEL], half: us
     }
 }
 
+/// The work space that [`unpack`] needs for N × N matrices.
+pub(super) fn panels_len(n: usize) -> usize {
+    tiles(n).div_ceil(2) * n.next_multiple_of(TILE) * PANEL
+}
+
 dispatch! {
-    /// Writes the N × N matrix. `panels` is work space.
-    pub(super) fn unpack<V>(n: usize, triangle: &[f64], panels: &mut Vec<f64>, out: &mut [f64]) {
+    /// Writes the N × N matrix. `panels` is work space of [`panels_len`].
+    pub(super) fn unpack<V>(n: usize, triangle: &[f64], panels: &mut [f64], out: &mut [f64]) {
         let (tiles, height) = (tiles(n), n.next_multiple_of(TILE));
-        panels.resize(tiles.div_ceil(2) * height * PANEL, 0.0);
         expand::<V>(tiles, height, triangle, panels);
         for (s, panel) in panels.as_chunks::<PANEL>().0.chunks_exact(height).enumerate() {
             for (row, out) in panel.iter().zip(out.chunks_exact_mut(n)) {
@@ -103,7 +107,7 @@ mod tests {
             }
             for width in Width::all() {
                 let mut out = vec![f64::NAN; n * n];
-                unpack(width, n, &triangle, &mut Vec::new(), &mut out);
+                unpack(width, n, &triangle, &mut vec![0.0; panels_len(n)], &mut out);
                 for (ij, x) in out.into_iter().enumerate() {
                     let (i, j) = (ij / n, ij % n);
                     assert_eq!(x, triangle[entry(i.max(j), i.min(j))], "{n}: {i}, {j}");

@@ -3,11 +3,15 @@
 use super::outcome::{Outcome, Reach, relative_state};
 use super::setup::Setup;
 use crate::cancel::CancelToken;
-use crate::error::RunError;
+use crate::error::{RunError, Stopped};
 use crate::game::validation::BEYOND;
+use crate::memory::{MOST_BYTES, append, reserve, spare, within};
 use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
+
+/// What asks for memory here.
+const WHAT: &str = "the record of one run";
 
 /// A recorded run of L steps: L + 1 rows, the last the terminal state.
 ///
@@ -97,8 +101,8 @@ pub fn simulate_with(
                 Some(edges) => edges.observe(k, &z, dim, &sight, &mut topology),
             }
         }
-        let step = policy.at(k, &topology, &mut solver);
-        record.push(policy, k, &z, &attacker, &topology, &step);
+        let step = policy.at(k, &topology, &mut solver, cancel)?;
+        record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
         if !record.last_row_is_bounded(n + 2) {
             return Err(RunError::Range { trial: None, time: game.grid().time(k) });
         }
@@ -141,8 +145,37 @@ impl Record {
         tails.into_iter().flatten().all(|x| x.abs() <= BEYOND) && self.theta.last().is_some_and(|x| x.is_finite())
     }
 
-    fn push(&mut self, policy: &Policy, k: usize, z: &[f64], attacker: &[f64], network: &Topology, step: &StepPolicy) {
+    /// Bytes that `rows` rows of a game take.
+    fn bytes(policy: &Policy, rows: usize, dim: usize) -> u128 {
+        let game = policy.game();
+        let (n, m) = (game.size() as u128, game.constrained() as u128);
+        let numbers = 2 * (n + 1) * dim as u128 + m * n + 5;
+        rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128)
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "what a row holds")]
+    fn push(
+        &mut self,
+        policy: &Policy,
+        k: usize,
+        z: &[f64],
+        attacker: &[f64],
+        network: &Topology,
+        step: &StepPolicy,
+        cancel: &CancelToken,
+    ) -> Result<(), Stopped> {
         let dim = self.dim;
+        within(WHAT, Self::bytes(policy, k + 1, dim), MOST_BYTES)?;
+        if k.is_multiple_of(64) {
+            spare(WHAT)?;
+        }
+        for list in [&mut self.positions, &mut self.controls] {
+            reserve(WHAT, list, z.len() + dim)?;
+        }
+        for list in [&mut self.theta, &mut self.terms] {
+            reserve(WHAT, list, 4)?;
+        }
+        reserve(WHAT, &mut self.networks, 1)?;
         for row in z.chunks_exact(dim) {
             self.positions.extend(row.iter().zip(attacker).map(|(x, a)| x + a));
         }
@@ -154,13 +187,14 @@ impl Record {
             apply(row, z, dim, &mut velocity);
             self.controls.extend_from_slice(&velocity);
         }
-        let problem = policy.problem(k);
-        self.terms.extend(problem.terms(policy.equilibrium().node(k), &step.gains.rows));
+        let problem = policy.problem(k, cancel)?;
+        self.terms.extend(problem.terms(policy.equilibrium().node(k), &step.gains.rows, cancel)?);
         self.networks.push(network.clone());
-        self.gains.extend_from_slice(&step.gains.rows);
+        append(WHAT, &mut self.gains, &step.gains.rows)?;
         self.theta.push(step.gains.theta);
         self.iterations += step.gains.iterations;
         self.unconverged += usize::from(step.gains.status != Status::Converged);
         self.certified += usize::from(step.gains.certified);
+        Ok(())
     }
 }

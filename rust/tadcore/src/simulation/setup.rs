@@ -1,8 +1,10 @@
 //! What one run adds to a game: positions and radii, checked before anything runs.
 
+use super::outcome::relative_state;
 use crate::error::GameError;
 use crate::game::Game;
-use crate::game::validation::{FARTHEST, is_positive, positive, rule};
+use crate::game::validation::{FARTHEST, FINEST, is_positive, positive, rule};
+use crate::network::{Topology, observe, squared_reach};
 
 /// Positions and radii of one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +57,36 @@ impl Setup<'_> {
         if let Some(i) = (0..n).find(|&i| self.capture[i] >= self.visibility[i]) {
             refuse(&format!("capture_radii[{i}]"), self.capture[i], "smaller than the visibility radius")?;
         }
+        let least = FINEST * self.extent();
+        if let Some(i) = self.visibility.iter().position(|&zeta| zeta < least) {
+            let words = "at least 1e-12 of the largest distance from the attacker along an axis, or infinity";
+            refuse(&format!("visibility_radii[{i}]"), self.visibility[i], words)?;
+        }
         Ok(())
+    }
+
+    /// The largest distance of a player from the attacker along an axis.
+    fn extent(&self) -> f64 {
+        let (players, attacker) = self.positions.split_at(self.positions.len() - self.dim);
+        let rows = players.chunks_exact(self.dim);
+        rows.flat_map(|row| row.iter().zip(attacker)).map(|(x, a)| (x - a).abs()).fold(0.0, f64::max)
+    }
+
+    /// Who sees whom at the start, as a run sees it: by states relative to the attacker, rounded as in a run.
+    ///
+    /// # Errors
+    /// [`GameError`] where positions and radii are not those of one game.
+    pub fn network(&self) -> Result<Topology, GameError> {
+        let (players, m) = (self.positions.len() / self.dim.max(1), self.visibility.len());
+        let found = self.positions.len();
+        if self.dim == 0 || found != players * self.dim || players < 3 || !(players - 2..players).contains(&m) {
+            return Err(GameError::Length { field: "positions", found, expected: (m + 2) * self.dim });
+        }
+        let mut z = Vec::new();
+        relative_state(self.positions, self.dim, &mut z);
+        let sight: Vec<f64> = self.visibility.iter().map(|&zeta| squared_reach(zeta)).collect();
+        let mut topology = Topology::empty(m, players - 1);
+        observe(&z, self.dim, &sight, &mut topology);
+        Ok(topology)
     }
 }

@@ -36,6 +36,9 @@ pub use search::Start;
 pub(crate) use tadcore_kernels::synthesis::newton;
 pub use theta::Problem;
 
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
+use crate::memory::zeros;
 use crate::network::Topology;
 use newton::{Limits, Tasks};
 use search::{Candidate, Dispatcher, Search};
@@ -128,48 +131,64 @@ impl Synthesizer {
         Self::default()
     }
 
+    /// Lets `cancel` stop what it solves from now on.
+    pub fn watch(&mut self, cancel: &CancelToken) {
+        self.dispatcher.watch(cancel);
+    }
+
     /// The gains for `topology` at the instant of `problem`.
-    pub fn solve(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Gains {
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for so many unknowns, or the token that it watches was raised.
+    pub fn solve(&mut self, problem: &Problem, topology: &Topology, options: Options) -> Result<Gains, Stopped> {
         let mut gains = None;
-        self.solve_all(problem, std::slice::from_ref(topology), options, |_, found| gains = Some(found));
-        gains.unwrap_or_else(|| unreachable!("one network, one answer"))
+        self.solve_all(problem, std::slice::from_ref(topology), options, |_, found| {
+            gains = Some(found);
+            Ok(())
+        })?;
+        Ok(gains.unwrap_or_else(|| unreachable!("one network, one answer")))
     }
 
     /// The gains for each of `topologies` at the instant of `problem`, handed to `each` with the topology's index. The
     /// descents of all go side by side, and none depends on another: the gains are those that [`Self::solve`] gives.
+    ///
+    /// # Errors
+    /// As for [`Self::solve`], and what `each` says.
     pub fn solve_all(
         &mut self,
         problem: &Problem,
         topologies: &[Topology],
         options: Options,
-        mut each: impl FnMut(usize, Gains),
-    ) {
+        mut each: impl FnMut(usize, Gains) -> Result<(), Stopped>,
+    ) -> Result<(), Stopped> {
         let limits = Limits {
             iterations: options.max_iterations,
             tolerance: TOLERANCE.0,
             acceptable: TOLERANCE.1,
             longest: f64::INFINITY,
         };
-        let mut candidates: Vec<Candidate> = topologies
-            .iter()
-            .map(|topology| {
-                let mut start = vec![0.0; problem.rows * problem.size];
-                search::canonical(problem, topology, &mut start);
-                Candidate::new(search::variables(topology), start)
-            })
-            .collect();
+        let mut candidates = Vec::with_capacity(topologies.len());
+        for topology in topologies {
+            let mut start = zeros("the gains of one network", problem.rows * problem.size)?;
+            search::canonical(problem, topology, &mut start);
+            let candidate = Candidate::new(search::variables(topology), start);
+            search::admit(&candidate)?;
+            candidates.push(candidate);
+        }
         let Self { dispatcher, tasks, doubled } = self;
         let mut search = Search { problem, limits, dispatcher, tasks, doubled };
         match options.method {
-            Method::Newton => search.run(&mut candidates),
+            Method::Newton => search.run(&mut candidates)?,
             Method::Descent => {
                 for (candidate, topology) in candidates.iter_mut().zip(topologies) {
                     let variables = search::paper_variables(topology);
-                    candidate.reached = search::descend(problem, &mut candidate.g, &variables, limits);
+                    let cancel = search.dispatcher.cancel();
+                    candidate.reached = search::descend(problem, &mut candidate.g, &variables, limits, cancel)?;
                     candidate.iterations = candidate.reached.iterations;
                 }
-                let all: Vec<usize> = (0..candidates.len()).collect();
-                search.certify(&mut candidates, &all);
+                candidates.iter_mut().for_each(|candidate| candidate.certified = candidate.complete);
+                let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].complete).collect();
+                search.certify(&mut candidates, &open)?;
             }
         }
         for (index, candidate) in candidates.into_iter().enumerate() {
@@ -184,8 +203,9 @@ impl Synthesizer {
                     certified: candidate.certified && candidate.reached.status == Status::Converged,
                     start: candidate.start,
                 },
-            );
+            )?;
         }
+        Ok(())
     }
 }
 

@@ -75,7 +75,7 @@ fn restrict(
     layout.begin(width, copies);
     layout.place(0, &(0..width).map(variable).collect::<Vec<_>>());
     layout.list();
-    layout.restrict_form(objective, g, &mut vec![0.0; objective.width()], out);
+    layout.restrict_form(objective, g, &mut vec![0.0; objective.width()], out, None);
 }
 
 pub(super) fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) {
@@ -95,18 +95,66 @@ pub(super) fn sample(interaction: Interaction) -> (Problem, Vec<f64>, Vec<f64>) 
         }
     }
     let gamma = [0.4, 0.3, 0.2, 0.6][..interaction.terms()].to_vec();
-    let problem = Problem::from_parts(interaction, vec![0.7, 1.3, 0.9], gamma, &p);
+    let problem =
+        Problem::from_parts(interaction, vec![0.7, 1.3, 0.9], gamma, &p, &CancelToken::new()).expect("memory");
     let g = (0..2 * 3 * size).map(|_| next()).collect();
     (problem, p, g)
+}
+
+/// Past some size the Hessian's constant part is not in memory: its rows, and single entries of them, are put together as
+/// they are read, bitwise the same.
+#[test]
+fn rows_put_together_are_those_in_memory() {
+    /// Every row of the form by rows, and the entries that it gives singly.
+    fn rows(objective: &mut impl Objective<f64>, g: &[f64], copies: usize) -> (Vec<f64>, Vec<f64>) {
+        let width = objective.width();
+        objective.value(g);
+        objective.keep(true);
+        objective.prepare(g);
+        let (mut full, mut single, mut row) = (Vec::new(), Vec::new(), vec![0.0; width]);
+        let mut layout = Layout::default();
+        layout.begin(width / copies, copies);
+        // Every second row knows differences only.
+        let known = |entry: &usize| (entry / 4).is_multiple_of(2) || entry % 4 != entry / 4;
+        let relative = |entry: usize| Variable { entry, own: entry / 4 * 5, relative: entry / 4 % 2 == 1 };
+        layout.place(0, &(0..width / copies).filter(known).map(relative).collect::<Vec<_>>());
+        layout.list();
+        for slot in layout.listed() {
+            let end = (slot.entry / 4 + 1) * 4;
+            objective.row(g, slot, &mut row);
+            full.extend_from_slice(&row[..end]);
+            single.extend((0..end).filter_map(|at| objective.entry(g, slot, at)));
+        }
+        (full, single)
+    }
+    let (problem, _, g) = sample(Interaction::I1);
+    let mut bare = problem.theta.double.clone();
+    bare.quadratic = [Vec::new(), Vec::new()];
+    let memory = "memory";
+    let half = &g[..g.len() / 2];
+    let (expected, none) = rows(&mut RealGains::<f64, 0>::new(&problem.theta.double, None).expect(memory), half, 1);
+    let (full, single) = rows(&mut RealGains::<f64, 0>::new(&bare, None).expect(memory), half, 1);
+    assert!(none.is_empty() && expected.len() > 80);
+    assert_eq!((&full, &single), (&expected, &expected));
+    for complex in [true, false] {
+        let doubled = |of| {
+            let mut doubled = Doubled::<f64, 0>::new(of, None).expect(memory);
+            doubled.set_lane(0, complex, 1.0);
+            rows(&mut doubled, &g, 2)
+        };
+        let (expected, none) = doubled(&problem.theta.double);
+        assert!(none.is_empty() && expected.len() > 300);
+        assert_eq!(doubled(&bare), (expected.clone(), expected), "{complex}");
+    }
 }
 
 #[test]
 fn derivatives_match_differences() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, _, g) = sample(interaction);
-        check(&mut RealGains::<f64, 0>::new(&problem.theta.double), &g[..g.len() / 2]);
+        check(&mut RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory"), &g[..g.len() / 2]);
         for complex in [true, false] {
-            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double);
+            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double, None).expect("memory");
             doubled.set_lane(0, complex, 1.0);
             check(&mut doubled, &g);
         }
@@ -126,7 +174,11 @@ fn neighbours_and_width_change_nothing() {
         let solve = |width, topologies: &[Topology]| {
             let mut solver = Synthesizer { dispatcher: Dispatcher::of(width), ..Synthesizer::default() };
             let mut all = Vec::new();
-            solver.solve_all(&problem, topologies, Options::default(), |_, gains| all.push(gains));
+            let each = |_, gains| {
+                all.push(gains);
+                Ok(())
+            };
+            solver.solve_all(&problem, topologies, Options::default(), each).expect("memory");
             all
         };
         let alone: Vec<Gains> =
@@ -146,8 +198,8 @@ fn the_value_is_the_weighted_sum_of_the_terms() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, p, g) = sample(interaction);
         let g = &g[..g.len() / 2];
-        let value = RealGains::<f64, 0>::new(&problem.theta.double).value(g);
-        let sum = problem.weigh(&problem.terms(&p, g));
+        let value = RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory").value(g);
+        let sum = problem.weigh(&problem.terms(&p, g, &CancelToken::new()).expect("memory"));
         assert!((sum - value).abs() < 1e-12 * value);
     }
 }
@@ -158,9 +210,9 @@ fn who_sees_no_one_has_no_gain_and_who_sees_all_plays_the_equilibrium() {
         let (problem, _, _) = sample(interaction);
         let (m, n) = (problem.rows(), problem.size());
         let mut solver = Synthesizer::new();
-        let blind = solver.solve(&problem, &Topology::empty(m, n), Options::default());
+        let blind = solver.solve(&problem, &Topology::empty(m, n), Options::default()).expect("memory");
         assert!(blind.rows.iter().all(|&g| g == 0.0) && blind.certified);
-        let full = solver.solve(&problem, &Topology::complete(m, n), Options::default());
+        let full = solver.solve(&problem, &Topology::complete(m, n), Options::default()).expect("memory");
         assert!(full.theta < 1e-24 && full.certified);
         for (g, f) in full.rows.iter().zip(problem.fne()) {
             assert!((g - f).abs() < 1e-12);
@@ -218,13 +270,14 @@ fn doubled_gains_are_complex_or_stacked() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, _, g) = sample(interaction);
         for complex in [true, false] {
-            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double);
+            let mut doubled = Doubled::<f64, 0>::new(&problem.theta.double, None).expect("memory");
             doubled.set_lane(0, complex, 1.0);
             let (value, expected) = (doubled.value(&g), by_definition(&problem, &g, complex));
             assert!((value - expected).abs() < 1e-12 * expected, "{interaction:?} {complex}: {value} {expected}");
             let mut flat = g.clone();
             flat[g.len() / 2..].fill(0.0);
-            let real = RealGains::<f64, 0>::new(&problem.theta.double).value(&flat[..g.len() / 2]);
+            let real =
+                RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory").value(&flat[..g.len() / 2]);
             assert!((doubled.value(&flat) - real).abs() < 1e-12 * real, "{interaction:?} {complex}");
         }
     }
@@ -239,8 +292,10 @@ fn sizes_bound_the_parts_that_cancel() {
         for term in 0..interaction.terms() {
             let mut gamma = vec![0.0; interaction.terms()];
             gamma[term] = 0.7;
-            let problem = Problem::from_parts(interaction, sampled.theta.double.r.clone(), gamma, &p);
-            let mut objective = RealGains::<f64, 0>::new(&problem.theta.double);
+            let problem =
+                Problem::from_parts(interaction, sampled.theta.double.r.clone(), gamma, &p, &CancelToken::new())
+                    .expect("memory");
+            let mut objective = RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory");
             let zero = objective.value(&vec![0.0; m * n]);
             assert!(zero <= problem.theta.double.scale.value * (1.0 + 1e-14), "{interaction:?} {term}");
             for size in [1e-3, 1.0, 1e3] {

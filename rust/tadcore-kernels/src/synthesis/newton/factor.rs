@@ -9,29 +9,41 @@
 //! four divisions follow one another in a tile of the diagonal, and nothing else waits. There is no square root. A factor
 //! holds **L** below its diagonal, C = **LD** above it (entry (j, i), j < i, is C_ij), and 1/D on it: what a tile takes
 //! off its neighbours lies together in memory, by rows and by columns.
+//!
+//! Past [`BLOCKED_SIZE`] faer's is called on blocks of columns, so that a cancellation is noticed between two of them.
 
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor;
-use faer::{MatMut, Par};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
+use faer::{Accum, MatMut, Par, Spec};
 
 use super::factor_one::factorise_one;
 use super::layout::{GROUP, Layout, packed};
 use super::tile::{Pivots, diagonal, tile};
+use crate::cancel::{CancelToken, raised};
 use crate::simd::{Number, Width};
 
 /// Unknowns from which faer's factorisation may be used.
 const LIBRARY_SIZE: usize = 512;
+/// Unknowns beyond which it goes by blocks, and the columns and rows of one.
+const BLOCKED_SIZE: usize = 1536;
+const BLOCK: usize = 256;
 
 /// What may work on one matrix at a time.
 #[derive(Debug, Clone, Copy)]
-pub struct Backend {
+pub struct Backend<'a> {
     /// faer, on large matrices; its bits differ from those of the loops here.
     pub library: bool,
     /// Registers, bitwise equal.
     pub width: Width,
+    /// What stops it.
+    pub cancel: Option<&'a CancelToken>,
 }
 
 /// Factorises H + μI, given by its packed lower triangle, into `f`, and says in which lanes it is positive definite to
 /// working precision. Where it is not, the second answer is the pivot that failed, its sign turned: about what μ lacks.
+/// Once the backend's token is raised, no.
 ///
 /// An unknown that a lane does not have (`layout`) has the unit row there.
 #[inline(always)]
@@ -40,7 +52,7 @@ pub fn factorise<T: Number>(h: &[T], damping: T, layout: &Layout<T>, backend: Ba
     if let (Some(h), Some(f)) = (T::alone(h), T::alone_mut(f)) {
         let (damping, used) = (damping.lane(0), layout.used());
         let (definite, lack) = if backend.library && d >= LIBRARY_SIZE {
-            (factorise_large(h, damping, used, d, f), 0.0)
+            (factorise_large(h, damping, used, d, f, backend.cancel), 0.0)
         } else {
             factorise_one(backend.width, h, damping, used, d, f)
         };
@@ -89,29 +101,107 @@ fn factorise_columns<T: Number>(
 }
 
 #[inline(never)]
-fn factorise_large(h: &[f64], damping: f64, used: usize, d: usize, f: &mut [f64]) -> bool {
+fn factorise_large(
+    h: &[f64],
+    damping: f64,
+    used: usize,
+    d: usize,
+    f: &mut [f64],
+    cancel: Option<&CancelToken>,
+) -> bool {
     for i in 0..d {
         f[i * d..][..i + 1].copy_from_slice(&h[packed(i)..][..i + 1]);
         f[i * d + i] = if i < used { f[i * d + i] + damping } else { 1.0 };
     }
     // faer reads columns: the transposed view turns our lower triangle, stored by rows, into its row-strided one.
-    let mut view = MatMut::from_row_major_slice_mut(&mut f[..d * d], d, d);
-    let need = factor::cholesky_in_place_scratch::<f64>(d, Par::Seq, faer::Spec::default());
-    let mut memory = faer::dyn_stack::MemBuffer::new(need);
-    let stack = faer::dyn_stack::MemStack::new(&mut memory);
-    let signs = factor::LdltRegularization::default();
-    if factor::cholesky_in_place(view.as_mut(), signs, Par::Seq, stack, faer::Spec::default()).is_err() {
+    let view = MatMut::from_row_major_slice_mut(&mut f[..d * d], d, d);
+    if !(if d > BLOCKED_SIZE { by_blocks(view, cancel) } else { at_once(view) }) {
         return false;
     }
-    for j in 0..d {
-        let pivot = f[j * d + j];
-        if !pivot.is_finite() || pivot <= 0.0 {
+    // C = LD, by blocks of both: one of them is read across its rows.
+    for (first, last) in blocks(0, d) {
+        if raised(cancel) {
             return false;
         }
-        for i in j + 1..d {
-            f[j * d + i] = f[i * d + j] * pivot;
+        for j in first..last {
+            let pivot = f[j * d + j];
+            if !pivot.is_finite() || pivot <= 0.0 {
+                return false;
+            }
         }
-        f[j * d + j] = 1.0 / pivot;
+        for (low, high) in blocks(first, d) {
+            for j in first..last {
+                let pivot = f[j * d + j];
+                for i in low.max(j + 1)..high {
+                    f[j * d + i] = f[i * d + j] * pivot;
+                }
+            }
+        }
+        for j in first..last {
+            f[j * d + j] = 1.0 / f[j * d + j];
+        }
+    }
+    true
+}
+
+/// The blocks of `first..end`: where each begins and ends.
+fn blocks(first: usize, end: usize) -> impl Iterator<Item = (usize, usize)> {
+    (first..end).step_by(BLOCK).map(move |at| (at, end.min(at + BLOCK)))
+}
+
+/// **L** below the diagonal and D on it, by one call; whether the matrix is definite.
+fn at_once(a: MatMut<'_, f64>) -> bool {
+    let need = factor::cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, Spec::default());
+    let Ok(mut memory) = MemBuffer::try_new(need) else { return false };
+    let (stack, signs) = (MemStack::new(&mut memory), factor::LdltRegularization::default());
+    factor::cholesky_in_place(a, signs, Par::Seq, stack, Spec::default()).is_ok()
+}
+
+/// The same by blocks of columns: what remains loses the products of each before the next is looked at.
+fn by_blocks(mut a: MatMut<'_, f64>, cancel: Option<&CancelToken>) -> bool {
+    let d = a.nrows();
+    for (first, last) in blocks(0, d) {
+        let (_, _, _, mut rest) = a.as_mut().split_at_mut(first, first);
+        let width = last - first;
+        let (mut on, _, mut below, mut after) = rest.as_mut().split_at_mut(width, width);
+        if !at_once(on.as_mut()) {
+            return false;
+        }
+        for (low, high) in blocks(0, d - last) {
+            if raised(cancel) {
+                return false;
+            }
+            // Rows of A := A L⁻ᵀ, which is C = LD.
+            let part = below.as_mut().subrows_mut(low, high - low);
+            solve_unit_lower_triangular_in_place(on.as_ref(), part.transpose_mut(), Par::Seq);
+        }
+        let scaled = below.as_ref().to_owned();
+        let reciprocals: Vec<f64> = (0..width).map(|j| 1.0 / on[(j, j)]).collect();
+        for i in 0..d - last {
+            for (j, reciprocal) in reciprocals.iter().enumerate() {
+                below[(i, j)] *= reciprocal;
+            }
+        }
+        for (low, high) in blocks(0, d - last) {
+            for (left, right) in blocks(0, high) {
+                if raised(cancel) {
+                    return false;
+                }
+                let tile = after.as_mut().submatrix_mut(low, left, high - low, right - left);
+                let shape = if left == low { BlockStructure::TriangularLower } else { BlockStructure::Rectangular };
+                triangular::matmul(
+                    tile,
+                    shape,
+                    Accum::Add,
+                    below.as_ref().subrows(low, high - low),
+                    BlockStructure::Rectangular,
+                    scaled.as_ref().subrows(left, right - left).transpose(),
+                    BlockStructure::Rectangular,
+                    -1.0,
+                    Par::Seq,
+                );
+            }
+        }
     }
     true
 }
@@ -180,9 +270,9 @@ mod tests {
             .collect()
     }
 
-    fn backends() -> Vec<Backend> {
-        let alone = Width::all().into_iter().map(|width| Backend { library: false, width });
-        alone.chain([Backend { library: true, width: Width::Baseline }]).collect()
+    fn backends() -> Vec<Backend<'static>> {
+        let alone = Width::all().into_iter().map(|width| Backend { library: false, width, cancel: None });
+        alone.chain([Backend { library: true, width: Width::Baseline, cancel: None }]).collect()
     }
 
     #[test]
@@ -192,7 +282,7 @@ mod tests {
                 (lower(used, |i, j| ((i * 7 + j * 3) as f64).sin() + if i == j { 40.0 } else { 0.0 }), layout(used));
             let factors = Width::all().into_iter().map(|width| {
                 let mut f = vec![0.0; layout.len() * layout.len()];
-                let answer = factorise(&h, 0.125, &layout, Backend { library: false, width }, &mut f);
+                let answer = factorise(&h, 0.125, &layout, Backend { library: false, width, cancel: None }, &mut f);
                 (answer, f)
             });
             let factors: Vec<_> = factors.collect();
@@ -202,8 +292,9 @@ mod tests {
 
     #[test]
     fn both_factorisations_solve_the_same_system() {
-        for (d, damping) in
-            [1, 2, 5, 12, 95, 128, LIBRARY_SIZE, LIBRARY_SIZE + 2].into_iter().flat_map(|d| [(d, 0.25), (d, 0.0)])
+        for (d, damping) in [1, 2, 5, 12, 95, 128, LIBRARY_SIZE, LIBRARY_SIZE + 2, BLOCKED_SIZE + BLOCK + 3]
+            .into_iter()
+            .flat_map(|d| [(d, 0.25), (d, 0.0)])
         {
             let entry = |i: usize, j: usize| 1.0 / (1.0 + (i - j) as f64) + if i == j { 2.0 } else { 0.0 };
             let damped = |i: usize, j: usize| entry(i.max(j), i.min(j)) + if i == j { damping } else { 0.0 };
@@ -257,5 +348,30 @@ mod tests {
             assert!(!factorise(&h, 0.25, &layout, backend, &mut f).0, "{d}");
             assert!(factorise(&h, 1.0, &layout, backend, &mut f).0, "{d}");
         }
+    }
+
+    /// By blocks as by rows, also where the matrix is indefinite beyond the first block; a raised token is no factor.
+    #[test]
+    fn a_factor_by_blocks_can_be_stopped() {
+        let d = BLOCKED_SIZE + 4;
+        let cancel = CancelToken::new();
+        let backend = Backend { library: true, width: Width::Baseline, cancel: Some(&cancel) };
+        let (layout, mut f) = (layout(d), vec![0.0; d * d]);
+        let matrix = |last: f64| {
+            lower(d, |i, j| {
+                if i != j {
+                    0.0
+                } else if i == 2 * BLOCK {
+                    last
+                } else {
+                    2.0
+                }
+            })
+        };
+        assert!(factorise(&matrix(1.0), 0.0, &layout, backend, &mut f).0);
+        assert_eq!((f[0], f[2 * BLOCK * (d + 1)]), (0.5, 1.0));
+        assert!(!factorise(&matrix(-1.0), 0.0, &layout, backend, &mut f).0);
+        cancel.cancel();
+        assert!(!factorise(&matrix(1.0), 0.0, &layout, backend, &mut f).0);
     }
 }

@@ -1,7 +1,13 @@
 //! The unknowns of several networks side by side, and forms on the gains restricted to them.
 
 use super::variables::Variable;
+use crate::cancel::{CancelToken, raised};
 use crate::simd::Number;
+
+/// Entries of a row, for each unknown, from which they are asked for singly.
+const SPARSE: usize = 12;
+/// Rows of a form between two looks at the cancel token.
+const POLL: usize = 16;
 
 /// Unknowns come in groups of this size, that factorisations take at once: the last are filled up with empty ones.
 pub const GROUP: usize = 4;
@@ -25,6 +31,11 @@ pub struct Slot<T: Number> {
 pub trait Form<T: Number> {
     /// Writes the form's product with the direction of `v`: its entries before and in the block of `v`.
     fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]);
+
+    /// One entry of that product, where the form gives them singly.
+    fn entry(&self, _g: &[T], _v: &Slot<T>, _at: usize) -> Option<T> {
+        None
+    }
 }
 
 /// The variables of the networks in the lanes: an unknown that a lane does not have stays where it is.
@@ -110,6 +121,11 @@ impl<T: Number> Layout<T> {
         self.used
     }
 
+    /// The unknowns that are not empty.
+    pub fn listed(&self) -> &[Slot<T>] {
+        &self.slots[..self.used]
+    }
+
     /// The lanes that have an unknown.
     #[inline(always)]
     pub fn active(&self, slot: usize) -> T::Mask {
@@ -144,11 +160,39 @@ impl<T: Number> Layout<T> {
     }
 
     /// Restricts a quadratic form on the gains to the variables: the packed lower triangle of `out`. `row` holds one of
-    /// the form's.
+    /// the form's. Once `cancel` is raised the triangle is not finished.
     #[inline(always)]
-    pub fn restrict_form(&self, form: &impl Form<T>, g: &[T], row: &mut [T], out: &mut [T]) {
+    pub fn restrict_form(
+        &self,
+        form: &impl Form<T>,
+        g: &[T],
+        row: &mut [T],
+        out: &mut [T],
+        cancel: Option<&CancelToken>,
+    ) {
         let zero = T::splat(0.0);
         for (a, va) in self.slots[..self.used].iter().enumerate() {
+            if a % POLL == POLL - 1 && raised(cancel) {
+                return;
+            }
+            if T::LANES == 1 && SPARSE * self.used < row.len() {
+                let mut known = true;
+                for (vb, out) in self.slots[..a + 1].iter().zip(&mut out[packed(a)..packed(a + 1)]) {
+                    let Some(x) = form.entry(g, va, vb.entry) else {
+                        known = false;
+                        break;
+                    };
+                    *out = x;
+                    if vb.differs
+                        && let Some(own) = form.entry(g, va, vb.own)
+                    {
+                        *out = x.minus(vb.relative, own);
+                    }
+                }
+                if known {
+                    continue;
+                }
+            }
             form.row(g, va, row);
             for (vb, out) in self.slots[..a + 1].iter().zip(&mut out[packed(a)..packed(a + 1)]) {
                 let x = row[vb.entry].minus(vb.relative, row[vb.own]);
@@ -225,7 +269,7 @@ mod tests {
         assert_eq!(moved, (0..12).map(|e| slope[e] + by(e)).collect::<Vec<f64>>());
 
         let mut lower = vec![f64::NAN; packed(8)];
-        layout.restrict_form(&form, &slope, &mut [0.0; 12], &mut lower);
+        layout.restrict_form(&form, &slope, &mut [0.0; 12], &mut lower, None);
         let entry = |a: usize, b: usize| -> f64 {
             (0..12).map(|e| directions[a][e] * product(&form.0[e], &directions[b])).sum()
         };

@@ -26,6 +26,8 @@ use super::layout::{Layout, packed};
 use super::objective::Objective;
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
+use crate::cancel::raised;
+use crate::error::NoMemory;
 use crate::simd::{Number, dot_in_order, take};
 
 /// How much of a Newton step's predicted decrease the steps after it may add, once the prediction holds.
@@ -46,7 +48,8 @@ const FIRST_REJECTED: f64 = 1e-2;
 const AIM: f64 = 0.8;
 const LEAST_RAISE: f64 = 1.25;
 
-/// Descends from every point of `tasks` along the variables of its owner, and leaves each end point in its place.
+/// Descends from every point of `tasks` along the variables of its owner, and leaves each end point in its place; once
+/// the backend's token is raised they are left unfinished.
 #[inline(always)]
 pub fn minimise<T: Number, O: Objective<T>>(
     objective: &mut O,
@@ -55,12 +58,12 @@ pub fn minimise<T: Number, O: Objective<T>>(
     limits: Limits,
     backend: Backend,
     w: &mut Workspace<T>,
-) {
-    let mut descents = Descents::new(objective, tasks, owners, limits, backend, w);
+) -> Result<(), NoMemory> {
+    let mut descents = Descents::new(objective, tasks, owners, limits, backend, w)?;
     loop {
         descents.refill();
-        if descents.busy == 0 {
-            return;
+        if descents.busy == 0 || raised(backend.cancel) {
+            return Ok(());
         }
         let mut round = Round::new();
         descents.propose(&mut round);
@@ -119,13 +122,22 @@ fn rounding<T: Number>(value: T, scale: T) -> T {
     T::splat(if T::SINGLE { NOISE_SINGLE } else { NOISE }) * (value + (value * scale).sqrt())
 }
 
+/// The unknowns that the lanes may have together: one network's, or where there are several anything.
+#[inline(always)]
+pub fn unknowns<T: Number>(tasks: &Tasks, owners: &[Owner]) -> usize {
+    if T::LANES > 1 {
+        return tasks.width();
+    }
+    (0..tasks.len()).map(|task| owners[tasks.owner(task)].variables.len()).max().unwrap_or(0)
+}
+
 /// The descents of a list, as many at a time as there are lanes.
 struct Descents<'a, T: Number, O> {
     objective: &'a mut O,
     tasks: &'a mut Tasks,
     owners: &'a [Owner<'a>],
     limits: Limits,
-    backend: Backend,
+    backend: Backend<'a>,
     layout: &'a mut Layout<T>,
     /// The points, and the gradients there with respect to all gains; the same for the points tried.
     g: &'a mut [T],
@@ -163,13 +175,18 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
         tasks: &'a mut Tasks,
         owners: &'a [Owner<'a>],
         limits: Limits,
-        backend: Backend,
+        backend: Backend<'a>,
         w: &'a mut Workspace<T>,
-    ) -> Self {
+    ) -> Result<Self, NoMemory> {
         let (width, zero, noise_scale) = (objective.width(), T::splat(0.0), T::splat(objective.value_scale()));
-        w.grow(width);
-        w.layout.begin(tasks.width(), width / tasks.width().max(1));
-        Self {
+        let copies = width / tasks.width().max(1);
+        let unknowns = copies * unknowns::<T>(tasks, owners);
+        w.grow(width, unknowns)?;
+        if limits.iterations > 0 {
+            w.grow_matrices(unknowns)?;
+        }
+        w.layout.begin(tasks.width(), copies);
+        Ok(Self {
             objective,
             tasks,
             owners,
@@ -207,7 +224,7 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
             fresh: 0,
             trusted: 0,
             compared: 0,
-        }
+        })
     }
 
     /// Gives the lanes without work the next descents of the list.
@@ -299,7 +316,7 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
             let d = self.layout.len();
             let hessian = &mut self.hessian[..packed(d)];
             self.objective.prepare(self.g);
-            self.layout.restrict_form(&*self.objective, self.g, self.row, hessian);
+            self.layout.restrict_form(&*self.objective, self.g, self.row, hessian, self.backend.cancel);
             self.layout.restrict(self.full, &mut self.gradient[..d]);
             self.largest = self.layout.largest(hessian);
             self.stale = false;

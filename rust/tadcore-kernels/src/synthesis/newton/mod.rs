@@ -25,7 +25,7 @@ mod workspace;
 pub use factor::{Backend, factorise};
 pub use layout::packed;
 pub use layout::{Form, Layout, Slot};
-pub use minimise::minimise;
+pub use minimise::{minimise, unknowns};
 pub use objective::Objective;
 pub use tasks::Status;
 pub use tasks::{Incumbent, Limits, Owner, Reached, Tasks};

@@ -1,6 +1,8 @@
 //! Lists of descents, what belongs to each, and what it reached.
 
 use super::variables::Variable;
+use crate::error::NoMemory;
+use crate::memory;
 
 /// How a minimisation ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -105,14 +107,15 @@ impl Tasks {
     }
 
     /// Adds a descent of `owner`'s, and gives its start to be written.
-    pub fn add(&mut self, owner: usize, complex: bool, scale: f64) -> &mut [f64] {
+    pub fn add(&mut self, owner: usize, complex: bool, scale: f64) -> Result<&mut [f64], NoMemory> {
         let from = self.points.len();
+        memory::reserve("the starting points of one search", &mut self.points, self.length)?;
         self.points.resize(from + self.length, 0.0);
         self.whose.push((owner, complex, scale));
         self.reached.push(Reached::default());
         self.certified.push(false);
         self.pruned.push(false);
-        &mut self.points[from..]
+        Ok(&mut self.points[from..])
     }
 
     pub fn len(&self) -> usize {

@@ -1,6 +1,8 @@
 //! Scratch that is reused from solve to solve.
 
 use super::layout::{GROUP, Layout, packed};
+use crate::error::NoMemory;
+use crate::memory;
 use crate::simd::Number;
 
 /// The memory of descents side by side.
@@ -49,24 +51,30 @@ impl<T: Number> Default for Workspace<T> {
 }
 
 impl<T: Number> Workspace<T> {
-    /// Makes room for gains of `width` entries.
+    /// Makes room for gains of `width` entries, so many of them unknown.
     #[inline(always)]
-    pub fn grow(&mut self, width: usize) {
-        let unknowns = width.next_multiple_of(GROUP);
-        let room = |numbers: &mut Vec<T>, len| {
-            if numbers.len() < len {
-                numbers.resize(len, T::splat(0.0));
-            }
-        };
+    pub fn grow(&mut self, width: usize, unknowns: usize) -> Result<(), NoMemory> {
+        let unknowns = unknowns.next_multiple_of(GROUP);
         for vector in
             [&mut self.g, &mut self.slope, &mut self.trial, &mut self.trial_slope, &mut self.incumbent, &mut self.row]
         {
-            room(vector, width);
+            room(vector, width)?;
         }
         for vector in [&mut self.gradient, &mut self.step, &mut self.other] {
-            room(vector, unknowns);
+            room(vector, unknowns)?;
         }
-        room(&mut self.hessian, packed(unknowns));
-        room(&mut self.factor, unknowns * unknowns);
+        Ok(())
     }
+
+    /// Makes room for a Hessian and its factor.
+    #[inline(always)]
+    pub fn grow_matrices(&mut self, unknowns: usize) -> Result<(), NoMemory> {
+        let unknowns = unknowns.next_multiple_of(GROUP);
+        room(&mut self.hessian, packed(unknowns))?;
+        room(&mut self.factor, unknowns * unknowns)
+    }
+}
+
+fn room<T: Number>(numbers: &mut Vec<T>, len: usize) -> Result<(), NoMemory> {
+    memory::grow("the synthesis of one network", numbers, len, T::splat(0.0))
 }

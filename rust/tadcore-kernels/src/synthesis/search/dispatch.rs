@@ -6,8 +6,10 @@
 
 use std::any::Any;
 
+use crate::cancel::CancelToken;
+use crate::error::{NoMemory, Stopped};
 use crate::simd::{Number, Width, dispatch, widened};
-use crate::synthesis::newton::{Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, minimise};
+use crate::synthesis::newton::{Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, minimise, unknowns};
 use crate::synthesis::theta::{Certificate, Coefficients, Doubled, Precisions, RealGains};
 
 /// N up to which there is a version with constant loop bounds.
@@ -37,6 +39,7 @@ pub enum Kind {
 pub struct Dispatcher {
     width: Width,
     scratch: Scratch,
+    cancel: CancelToken,
 }
 
 impl Default for Dispatcher {
@@ -65,19 +68,36 @@ struct List<'a> {
     tasks: &'a mut Tasks,
     owners: &'a [Owner<'a>],
     limits: Limits,
-    backend: Backend,
+    backend: Backend<'a>,
 }
 
 impl Dispatcher {
     /// A dispatcher for a width that the processor has.
     pub fn of(width: Width) -> Self {
-        Self { width, scratch: Scratch::default() }
+        Self { width, scratch: Scratch::default(), cancel: CancelToken::new() }
     }
 
-    /// Makes the descents of `tasks`.
+    /// Lets `cancel` stop what it runs.
+    pub fn watch(&mut self, cancel: &CancelToken) {
+        self.cancel = cancel.clone();
+    }
+
+    /// What stops it.
+    pub fn cancel(&self) -> &CancelToken {
+        &self.cancel
+    }
+
+    /// Makes the descents of `tasks`; where that is an error, nothing they hold means anything.
     // Inlined, it would have every version compiled once more where it is called.
     #[inline(never)]
-    pub fn run(&mut self, kind: Kind, problem: &Precisions, tasks: &mut Tasks, owners: &[Owner], limits: Limits) {
+    pub fn run(
+        &mut self,
+        kind: Kind,
+        problem: &Precisions,
+        tasks: &mut Tasks,
+        owners: &[Owner],
+        limits: Limits,
+    ) -> Result<(), Stopped> {
         match problem.double.size {
             2 => self.run_sized::<2>(kind, problem, tasks, owners, limits),
             3 => self.run_sized::<3>(kind, problem, tasks, owners, limits),
@@ -98,30 +118,33 @@ impl Dispatcher {
         tasks: &mut Tasks,
         owners: &[Owner],
         limits: Limits,
-    ) {
-        let backend = Backend { library: problem.double.size > CONSTANT_UP_TO, width: self.width };
+    ) -> Result<(), Stopped> {
+        let Self { width, scratch, cancel } = self;
+        let (width, library) = (*width, problem.double.size > CONSTANT_UP_TO);
+        let backend = Backend { library, width, cancel: Some(cancel) };
         let mut list = List { kind, tasks, owners, limits, backend };
-        let (width, scratch) = (self.width, &mut self.scratch);
         let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
         let single = problem.single.as_ref().filter(|_| side_by_side(N));
         match (kind, single) {
             (Kind::Screening | Kind::Doubled, Some(coefficients)) => {
                 if const { side_by_side(N) } && several {
-                    return several_single::<N>(width, coefficients, &mut list, scratch);
+                    several_single::<N>(width, coefficients, &mut list, scratch)?;
+                } else {
+                    one_single(width, coefficients, &mut list, scratch)?;
                 }
-                one_single(width, coefficients, &mut list, scratch);
             }
             _ => {
                 if const { side_by_side(N) } && several && kind != Kind::Doubled {
-                    return several_double::<N>(width, &problem.double, &mut list, scratch);
+                    several_double::<N>(width, &problem.double, &mut list, scratch)?;
+                } else if const { side_by_side(N) } && kind == Kind::Doubled {
+                    // Doubled gains only where single precision cannot hold the problem: one version for all small sizes.
+                    one_double::<0>(width, &problem.double, &mut list, scratch)?;
+                } else {
+                    one_double::<N>(width, &problem.double, &mut list, scratch)?;
                 }
-                // Doubled gains only where single precision cannot hold the problem: one version for all small sizes.
-                if const { side_by_side(N) } && kind == Kind::Doubled {
-                    return one_double::<0>(width, &problem.double, &mut list, scratch);
-                }
-                one_double::<N>(width, &problem.double, &mut list, scratch);
             }
         }
+        Ok(cancel.check()?)
     }
 }
 
@@ -140,59 +163,67 @@ pub fn single(problem: &Precisions) -> bool {
 
 dispatch! {
     /// As many descents side by side as a register holds.
-    fn several_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) {
+    fn several_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
         if const { V::SIZED } {
-            descend::<V::Double, N>(coefficients, list, scratch.of());
+            descend::<V::Double, N>(coefficients, list, scratch.of())
         } else {
-            any_size::<f64>(coefficients, list, scratch.of());
+            any_size::<f64>(coefficients, list, scratch.of())
         }
     }
 }
 
 dispatch! {
     /// The same in single precision.
-    fn several_single<V, const N: usize>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) {
+    fn several_single<V, const N: usize>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
         if const { !V::SIZED } {
-            any_size::<f32>(coefficients, list, scratch.of());
+            any_size::<f32>(coefficients, list, scratch.of())
         } else if list.kind == Kind::Doubled {
-            descend_doubled::<V::Half, N>(coefficients, list, scratch.of());
+            descend_doubled::<V::Half, N>(coefficients, list, scratch.of())
         } else {
-            descend::<V::Single, N>(coefficients, list, scratch.of());
+            descend::<V::Single, N>(coefficients, list, scratch.of())
         }
     }
 }
 
 widened! {
     /// One descent after another.
-    fn one_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) {
+    fn one_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
         if const { !V::SIZED } {
-            any_size::<f64>(coefficients, list, scratch.of());
+            any_size::<f64>(coefficients, list, scratch.of())
         } else if const { side_by_side(N) } || list.kind != Kind::Doubled {
-            descend::<f64, N>(coefficients, list, scratch.of());
+            descend::<f64, N>(coefficients, list, scratch.of())
         } else {
-            descend_doubled::<f64, N>(coefficients, list, scratch.of());
+            descend_doubled::<f64, N>(coefficients, list, scratch.of())
         }
     }
 }
 
 widened! {
     /// The same in single precision: seldom enough for one version for all sizes.
-    fn one_single<V>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) {
+    fn one_single<V>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
         if const { V::SIZED } {
-            run::<f32, 0>(coefficients, list, scratch.of());
+            run::<f32, 0>(coefficients, list, scratch.of())
         } else {
-            any_size::<f32>(coefficients, list, scratch.of());
+            any_size::<f32>(coefficients, list, scratch.of())
         }
     }
 }
 
 #[inline(never)]
-fn any_size<T: Number>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
-    run::<T, 0>(coefficients, list, w);
+fn any_size<T: Number>(
+    coefficients: &Coefficients<T::Scalar>,
+    list: &mut List,
+    w: &mut Workspace<T>,
+) -> Result<(), NoMemory> {
+    run::<T, 0>(coefficients, list, w)
 }
 
 #[inline(always)]
-fn run<T: Number, const N: usize>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
+fn run<T: Number, const N: usize>(
+    coefficients: &Coefficients<T::Scalar>,
+    list: &mut List,
+    w: &mut Workspace<T>,
+) -> Result<(), NoMemory> {
     match list.kind {
         Kind::Doubled => descend_doubled::<T, N>(coefficients, list, w),
         _ => descend::<T, N>(coefficients, list, w),
@@ -204,17 +235,23 @@ fn descend_doubled<T: Number, const N: usize>(
     coefficients: &Coefficients<T::Scalar>,
     list: &mut List,
     w: &mut Workspace<T>,
-) {
-    minimise(&mut Doubled::<T, N>::new(coefficients), list.tasks, list.owners, list.limits, list.backend, w);
+) -> Result<(), NoMemory> {
+    let mut doubled = Doubled::<T, N>::new(coefficients, list.backend.cancel)?;
+    minimise(&mut doubled, list.tasks, list.owners, list.limits, list.backend, w)
 }
 
 #[inline(always)]
-fn descend<T: Number, const N: usize>(coefficients: &Coefficients<T::Scalar>, list: &mut List, w: &mut Workspace<T>) {
-    let mut real = RealGains::<T, N>::new(coefficients);
-    minimise(&mut real, list.tasks, list.owners, list.limits, list.backend, w);
+fn descend<T: Number, const N: usize>(
+    coefficients: &Coefficients<T::Scalar>,
+    list: &mut List,
+    w: &mut Workspace<T>,
+) -> Result<(), NoMemory> {
+    let mut real = RealGains::<T, N>::new(coefficients, list.backend.cancel)?;
+    minimise(&mut real, list.tasks, list.owners, list.limits, list.backend, w)?;
     if !T::SINGLE && list.kind == Kind::Certified {
-        certify(&mut real, list.tasks, list.owners, list.backend, w);
+        certify(&mut real, list.tasks, list.owners, list.backend, w)?;
     }
+    Ok(())
 }
 
 /// Tries every end point for the certificate that proves a critical point to be a global minimiser.
@@ -225,8 +262,9 @@ fn certify<T: Number, const N: usize>(
     owners: &[Owner],
     backend: Backend,
     w: &mut Workspace<T>,
-) {
+) -> Result<(), NoMemory> {
     let width = real.width();
+    w.grow_matrices(unknowns::<T>(tasks, owners))?;
     let mut first = 0;
     while first < tasks.len() {
         let last = tasks.len().min(first + T::LANES);
@@ -240,7 +278,7 @@ fn certify<T: Number, const N: usize>(
         }
         w.layout.list();
         real.value(&w.g[..width]);
-        w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian);
+        w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian, backend.cancel);
         let largest = w.layout.largest(&w.hessian);
         let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
         let (definite, _) = factorise(&w.hessian, allowance, &w.layout, backend, &mut w.factor);
@@ -252,4 +290,5 @@ fn certify<T: Number, const N: usize>(
         }
         first = last;
     }
+    Ok(())
 }

@@ -2,6 +2,10 @@
 
 use crate::simd::Scalar;
 
+/// N up to which the constant part of the Hessian is a matrix in memory; beyond, where its (mN)² numbers would be most of
+/// what there is, its rows are put together as they are read, bitwise the same.
+pub const TABULATED_UP_TO: usize = 8;
+
 /// The numbers of one instant: F, M, W and R are those of the paper's problem at that instant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coefficients<S> {
@@ -20,10 +24,12 @@ pub struct Coefficients<S> {
     pub target: Vec<S>,
     /// W_p.
     pub coupling: Vec<Vec<S>>,
+    /// Σ_p W_pᵀW_p, m × m.
+    pub gram: Vec<S>,
     /// c_i.
     pub closeness: Vec<S>,
     /// The Hessian's constant part 4 Σ_p[(W_pᵀW_p)_ij **I** ± w_jᵀw_i] + 2δ_ij c_i **I** with + and with −, mN × mN;
-    /// blocks on and below the diagonal.
+    /// blocks on and below the diagonal. Empty past [`TABULATED_UP_TO`].
     pub quadratic: [Vec<S>; 2],
     pub scale: Scale,
 }
@@ -55,7 +61,7 @@ pub struct Precisions {
 
 impl From<Coefficients<f64>> for Precisions {
     fn from(double: Coefficients<f64>) -> Self {
-        let single = double.in_range().then(|| double.rounded());
+        let single = (double.size <= TABULATED_UP_TO && double.in_range()).then(|| double.rounded());
         Self { double, single }
     }
 }
@@ -83,6 +89,7 @@ impl Coefficients<f64> {
             fne: all(&self.fne),
             target: all(&self.target),
             coupling: self.coupling.iter().map(|w| all(w)).collect(),
+            gram: all(&self.gram),
             closeness: all(&self.closeness),
             quadratic: [all(&self.quadratic[0]), all(&self.quadratic[1])],
             scale: self.scale.clone(),

@@ -18,13 +18,19 @@
 //! The vector is laid out A first, then B, m × N each.
 
 use super::coefficients::Coefficients;
-use super::real::{add_product, add_row, add_unit, add_weighted, along, constant, symmetric_product};
+use super::real::{
+    add_product, add_row, add_row_entry, add_unit, add_unit_entry, add_weighted, along, assembled, assembled_entry,
+    constant, numbers, symmetric_product,
+};
+use crate::cancel::{CancelToken, raised};
+use crate::error::NoMemory;
 use crate::simd::{Number, dot, norm, sum_of_squares, take};
 use crate::synthesis::newton::{Form, Objective, Slot};
 
 /// Θ over doubled gains.
 pub struct Doubled<'a, T: Number, const N: usize> {
     problem: &'a Coefficients<T::Scalar>,
+    cancel: Option<&'a CancelToken>,
     /// s: 1 for complex gains, 0 for stacked ones.
     complex: T,
     /// σ.
@@ -44,20 +50,20 @@ pub struct Doubled<'a, T: Number, const N: usize> {
 
 impl<'a, T: Number, const N: usize> Doubled<'a, T, N> {
     #[inline(always)]
-    pub fn new(problem: &'a Coefficients<T::Scalar>) -> Self {
+    pub fn new(problem: &'a Coefficients<T::Scalar>, cancel: Option<&'a CancelToken>) -> Result<Self, NoMemory> {
         let (n, m, groups) = (problem.size, problem.rows, problem.coupling.len());
-        let zero = T::splat(0.0);
-        Self {
+        Ok(Self {
             problem,
-            complex: zero,
+            cancel,
+            complex: T::splat(0.0),
             sign: T::splat(1.0),
-            x: vec![zero; 2 * n * n],
-            kept: vec![zero; 2 * n * n],
-            delta: vec![zero; m * n],
-            coupled: vec![zero; 2 * groups * n * n],
-            gram: vec![zero; 3 * m * m],
+            x: numbers(2 * n * n)?,
+            kept: numbers(2 * n * n)?,
+            delta: numbers(m * n)?,
+            coupled: numbers(2 * groups * n * n)?,
+            gram: numbers(3 * m * m)?,
             scale: T::splat(1.0),
-        }
+        })
     }
 
     #[inline(always)]
@@ -100,13 +106,19 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
         }
         let [plus, minus] = &p.quadratic;
         for (j, (h, (((aj, bj), &r), gram))) in out.chunks_exact_mut(n).zip(players).take(i + 1).enumerate() {
-            let (at, at_own) = (entry * half + j * n, own * half + j * n);
-            constant(h, &plus[at..][..n], &plus[at_own..][..n], v);
-            if lower {
-                let (q, own) = (&minus[at..][..n], &minus[at_own..][..n]);
-                for b in 0..n {
-                    let minus = T::all(q[b]).minus(v.relative, T::all(own[b]));
-                    h[b] = T::select(stacked, h[b], minus);
+            if N == 0 && plus.is_empty() {
+                // One lane, in which gains are of one kind.
+                let sign = if lower && T::bits(stacked) == 0 { -1.0 } else { 1.0 };
+                assembled(h, p, sign, [i, a, j], v);
+            } else {
+                let (at, at_own) = (entry * half + j * n, own * half + j * n);
+                constant(h, &plus[at..][..n], &plus[at_own..][..n], v);
+                if lower {
+                    let (q, own) = (&minus[at..][..n], &minus[at_own..][..n]);
+                    for b in 0..n {
+                        let minus = T::all(q[b]).minus(v.relative, T::all(own[b]));
+                        h[b] = T::select(stacked, h[b], minus);
+                    }
                 }
             }
             if j == i {
@@ -120,6 +132,36 @@ impl<T: Number, const N: usize> Form<T> for Doubled<'_, T, N> {
             }
             add_unit(h, a, i, v, gram[usize::from(lower)]);
         }
+    }
+
+    #[inline(always)]
+    fn entry(&self, g: &[T], v: &Slot<T>, at: usize) -> Option<T> {
+        let p = self.problem;
+        if N > 0 || !p.quadratic[0].is_empty() {
+            return None;
+        }
+        let (n, m) = self.dimensions();
+        let half = m * n;
+        let (ra, ib) = g[..2 * half].split_at(half);
+        let (real, imaginary) = self.kept[..2 * n * n].split_at(n * n);
+        let lower = v.entry >= half;
+        let entry = if lower { v.entry - half } else { v.entry };
+        let (i, a) = (entry / n, entry % n);
+        let (j, b) = (at % half / n, at % n);
+        let (s, strength, gram) = (self.complex, T::all(p.strength[i]), &self.gram[3 * (i * m + j)..][..3]);
+        let (aj, bj, ai, bi) = (&ra[j * n..][..n], &ib[j * n..][..n], ra[i * n + b], ib[i * n + b]);
+        let f = strength * T::all(p.r[j]);
+        let (fa, fb) = (f * along(aj, a, i, v), f * along(bj, a, i, v));
+        if lower && at < half {
+            let h = (fa * bi).plus(s * fb, ai);
+            let h = if j == i { add_row_entry(h, T::splat(0.0) - strength, imaginary, n, [i, a, b], v) } else { h };
+            return Some(add_unit_entry(h, [i, a, b], v, gram[2]));
+        }
+        let sign = if lower && T::bits(T::splat(0.0).less(self.sign)) == 0 { -1.0 } else { 1.0 };
+        let h = assembled_entry(p, sign, [i, a, j, b], v);
+        let h = if j == i { add_row_entry(h, strength, real, n, [i, a, b], v) } else { h };
+        let (first, second, x, y) = if lower { (fb, s * fa, bi, ai) } else { (fa, s * fb, ai, bi) };
+        Some(add_unit_entry(h.plus(first, x).minus(second, y), [i, a, b], v, gram[usize::from(lower)]))
     }
 }
 
@@ -153,6 +195,9 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let mut rest = T::splat(0.0);
         let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(delta.chunks_exact_mut(n));
         for (i, ((ai, bi), di)) in rows.enumerate() {
+            if N == 0 && raised(self.cancel) {
+                break;
+            }
             let r = T::all(p.r[i]);
             for (a, (real, imaginary)) in real.chunks_exact_mut(n).zip(imaginary.chunks_exact_mut(n)).enumerate() {
                 let (fa, fb) = (r * ai[a], r * bi[a]);
@@ -172,10 +217,10 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let groups = p.coupling.len();
         for (group, w) in p.coupling.iter().enumerate() {
             let e = &mut self.coupled[group * n * n..][..n * n];
-            symmetric_product(e, n, &w[..m * n], delta, T::splat(1.0));
+            symmetric_product(e, n, &w[..m * n], delta, T::splat(1.0), self.cancel);
             rest = rest + sum_of_squares(e);
             let e = &mut self.coupled[(groups + group) * n * n..][..n * n];
-            symmetric_product(e, n, &w[..m * n], ib, self.sign);
+            symmetric_product(e, n, &w[..m * n], ib, self.sign, self.cancel);
             rest = rest + sum_of_squares(e);
         }
         rest.plus(T::all(p.first), sum_of_squares(real) + sum_of_squares(imaginary))
@@ -192,6 +237,9 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let rows = ra.chunks_exact(n).zip(ib.chunks_exact(n)).zip(self.delta.chunks_exact(n));
         let slopes = out_a.chunks_exact_mut(n).zip(out_b.chunks_exact_mut(n));
         for (i, (((ai, bi), di), (ga, gb))) in rows.zip(slopes).enumerate() {
+            if N == 0 && raised(self.cancel) {
+                break;
+            }
             let c = T::splat(2.0) * T::all(p.closeness[i]);
             for b in 0..n {
                 ga[b] = c * di[b];
@@ -223,6 +271,9 @@ impl<T: Number, const N: usize> Objective<T> for Doubled<'_, T, N> {
         let (ra, ib) = g[..2 * m * n].split_at(m * n);
         let s = self.complex;
         for i in 0..m {
+            if N == 0 && raised(self.cancel) {
+                break;
+            }
             let (ai, bi) = (&ra[i * n..][..n], &ib[i * n..][..n]);
             for j in 0..m {
                 let (aj, bj) = (&ra[j * n..][..n], &ib[j * n..][..n]);

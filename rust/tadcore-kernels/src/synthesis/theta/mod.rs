@@ -4,6 +4,6 @@ mod coefficients;
 mod doubled;
 mod real;
 
-pub use coefficients::{Coefficients, Precisions, Scale};
+pub use coefficients::{Coefficients, Precisions, Scale, TABULATED_UP_TO};
 pub use doubled::Doubled;
 pub use real::{Certificate, RealGains};

@@ -35,13 +35,18 @@ pub(crate) struct Candidate {
     pub iterations: usize,
     /// Whether its first descent says that later ones may end early.
     pub quick: bool,
+    /// Whether every constrained player sees everyone. The canonical start is then the equilibrium, where Θ, a sum of
+    /// squares, is zero: the global minimum, and nothing is left to be done.
+    pub complete: bool,
 }
 
 impl Candidate {
     /// A network that starts from `start`.
     pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
+        let complete = variables.len() == start.len();
         Self {
             variables,
+            complete,
             g: start.clone(),
             initial: start,
             reached: Reached::default(),

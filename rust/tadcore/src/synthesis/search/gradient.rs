@@ -5,6 +5,8 @@
 //! length is Barzilai and Borwein's, safeguarded by a non-monotone Armijo search over the last [`MEMORY`] values. It
 //! starts canonically, ends at a stationary point near its start, and does not restart.
 
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
 use crate::simd::norm;
 use crate::synthesis::newton::{Layout, Limits, Objective, Reached, Variable};
 use crate::synthesis::theta::{Problem, RealGains};
@@ -15,8 +17,14 @@ const MEMORY: usize = 10;
 const HALVINGS: usize = 60;
 
 /// Descends from `g` along `variables`, leaving the end point in `g`.
-pub(crate) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], limits: Limits) -> Reached {
-    let mut objective = RealGains::<f64, 0>::new(&problem.theta.double);
+pub(crate) fn descend(
+    problem: &Problem,
+    g: &mut [f64],
+    variables: &[Variable],
+    limits: Limits,
+    cancel: &CancelToken,
+) -> Result<Reached, Stopped> {
+    let mut objective = RealGains::<f64, 0>::new(&problem.theta.double, Some(cancel))?;
     let mut layout = Layout::default();
     layout.begin(g.len(), 1);
     layout.place(0, variables);
@@ -39,6 +47,7 @@ pub(crate) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], 
         let reference = recent.iter().fold(f64::NEG_INFINITY, |a: f64, &b| a.max(b));
         let mut taken = None;
         for _ in 0..HALVINGS {
+            cancel.check()?;
             let step: Vec<f64> = gradient.iter().map(|x| -length * x).collect();
             let mut trial = g.to_vec();
             layout.advance(&mut trial, &step);
@@ -63,5 +72,6 @@ pub(crate) fn descend(problem: &Problem, g: &mut [f64], variables: &[Variable], 
         length = if sy > 0.0 { ss / sy } else { 2.0 * length };
         std::mem::swap(&mut gradient, &mut next);
     }
-    Reached::new(value, norm(&gradient), objective.gradient_scale(g), iterations, &limits)
+    cancel.check()?;
+    Ok(Reached::new(value, norm(&gradient), objective.gradient_scale(g), iterations, &limits))
 }

@@ -1,5 +1,6 @@
 //! From the canonical start to the global minimum: which descents are made, and when no more are needed.
 //!
+//! 0. Where every constrained player sees everyone nothing: the canonical start is the equilibrium, with Θ = 0.
 //! 1. Newton from the canonical start. Most networks end here: the certificate of `theta` proves the minimum global (of
 //!    random networks, about four in five at n = 3 and three in five at n = 5).
 //! 2. Otherwise two restarts: a descent in complex gains and one in stacked gains, both from the canonical start with a
@@ -39,8 +40,8 @@ pub use candidate::Start;
 pub(crate) use dispatch::Kind;
 pub(crate) use dispatch::{Dispatcher, SIDE_BY_SIDE_UP_TO};
 pub(crate) use gradient::descend;
-pub(crate) use stages::Search;
 #[cfg(test)]
 pub(crate) use stages::{BASIN, DOUBLED_ITERATIONS, LONGEST_STEP, far_start};
+pub(crate) use stages::{Search, admit};
 pub(crate) use start::{canonical, paper_variables, variables};
 pub(crate) use tadcore_kernels::synthesis::search::dispatch;

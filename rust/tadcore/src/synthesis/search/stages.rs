@@ -2,6 +2,8 @@
 
 use super::candidate::{BACK, Candidate, Start};
 use super::dispatch::{self, Dispatcher, Kind};
+use crate::error::{NoMemory, Stopped};
+use crate::memory;
 use crate::simd::norm;
 use crate::synthesis::newton::{Limits, Owner, Tasks, advance, balance};
 use crate::synthesis::theta::Problem;
@@ -27,6 +29,22 @@ const QUICK: usize = 30;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
 
+/// The most bytes that the matrices of one descent may take: past some 9,000 unknowns its factorisations, of which there
+/// are hundreds, would take minutes each.
+const MOST_BYTES: u64 = 4 << 30;
+/// Bytes for each pair of unknowns: a factor, and the Hessian's triangle.
+const PAIR_BYTES: u128 = 12;
+
+/// Refuses a candidate whose search would take too much memory, before anything is allocated for it.
+pub(crate) fn admit(candidate: &Candidate) -> Result<(), NoMemory> {
+    if candidate.complete {
+        return Ok(());
+    }
+    // Twice as many in doubled gains.
+    let unknowns = 2 * candidate.variables.len() as u128;
+    memory::within("the synthesis of the gains under one network", PAIR_BYTES * unknowns.pow(2), MOST_BYTES)
+}
+
 /// What a search needs besides its candidates.
 pub(crate) struct Search<'a> {
     pub problem: &'a Problem,
@@ -39,60 +57,70 @@ pub(crate) struct Search<'a> {
 
 impl Search<'_> {
     /// Finds the global minimum of Θ for every candidate.
-    pub(crate) fn run(&mut self, candidates: &mut [Candidate]) {
-        self.begin(1);
-        for (e, candidate) in candidates.iter().enumerate() {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&candidate.initial);
-        }
-        self.descend(Kind::Certified, candidates);
-        for (task, candidate) in candidates.iter_mut().enumerate() {
-            let reached = self.tasks.reached(task);
-            candidate.take(Start::Canonical, self.tasks.point(task), reached);
-            candidate.iterations = reached.iterations;
-            candidate.certified = self.tasks.certified(task);
-            candidate.quick = candidate.iterations <= QUICK;
-        }
+    pub(crate) fn run(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
+        let limits = self.limits;
+        self.limits.iterations = 0;
+        self.first(Kind::Real, candidates, true)?;
+        self.limits = limits;
+        self.first(Kind::Certified, candidates, false)?;
         let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].certified).collect();
         if !open.is_empty() {
-            self.restart(candidates, &open);
+            self.restart(candidates, &open)?;
         }
-        self.polish(candidates);
+        self.polish(candidates)
+    }
+
+    /// The first descent of the candidates that are `complete`, or of the others.
+    fn first(&mut self, kind: Kind, candidates: &mut [Candidate], complete: bool) -> Result<(), Stopped> {
+        self.begin(1);
+        for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| candidate.complete == complete) {
+            self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidate.initial);
+        }
+        self.descend(kind, candidates)?;
+        for task in 0..self.tasks.len() {
+            let (candidate, reached) = (&mut candidates[self.tasks.owner(task)], self.tasks.reached(task));
+            candidate.take(Start::Canonical, self.tasks.point(task), reached);
+            candidate.iterations = reached.iterations;
+            candidate.certified = complete || self.tasks.certified(task);
+            candidate.quick = candidate.iterations <= QUICK;
+        }
+        Ok(())
     }
 
     /// Everything beyond the first descent, for the candidates `open`.
-    fn restart(&mut self, candidates: &mut [Candidate], open: &[usize]) {
-        let starts = self.double(candidates, open);
-        self.finish(candidates, starts);
+    fn restart(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Result<(), Stopped> {
+        let starts = self.double(candidates, open)?;
+        self.finish(candidates, starts)?;
         let mut lower = open.to_vec();
         for _ in 0..ROUNDS {
             self.begin(1);
             for &e in &lower {
-                self.reverse(e, &candidates[e].g);
+                self.reverse(e, &candidates[e].g)?;
             }
             let starts = vec![Start::Reversed; self.tasks.len()];
-            lower = self.finish(candidates, starts);
+            lower = self.finish(candidates, starts)?;
             if lower.is_empty() {
                 break;
             }
         }
         // Where a restart won there is another point to be tried for the certificate.
         let won: Vec<usize> = open.iter().copied().filter(|&e| candidates[e].start != Start::Canonical).collect();
-        self.certify(candidates, &won);
+        self.certify(candidates, &won)
     }
 
     /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
     /// long as the gradient falls.
-    fn polish(&mut self, candidates: &mut [Candidate]) {
+    fn polish(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         self.begin(1);
         for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| !candidate.quick) {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&candidate.g);
+            self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidate.g);
         }
         if self.tasks.len() == 0 {
-            return;
+            return Ok(());
         }
         let limits = self.limits;
         self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
-        self.descend(Kind::Real, candidates);
+        self.descend(Kind::Real, candidates)?;
         self.limits = limits;
         for task in 0..self.tasks.len() {
             let (candidate, reached) = (&mut candidates[self.tasks.owner(task)], self.tasks.reached(task));
@@ -101,6 +129,7 @@ impl Search<'_> {
                 candidate.take(candidate.start, self.tasks.point(task), reached);
             }
         }
+        Ok(())
     }
 
     /// Empties the list for points of as many copies of the gains.
@@ -109,21 +138,21 @@ impl Search<'_> {
     }
 
     /// Makes the listed descents, without incumbents.
-    fn descend(&mut self, kind: Kind, candidates: &[Candidate]) {
+    fn descend(&mut self, kind: Kind, candidates: &[Candidate]) -> Result<(), Stopped> {
         let owners: Vec<Owner> =
             candidates.iter().map(|e| Owner { variables: &e.variables, incumbent: None }).collect();
-        self.dispatcher.run(kind, &self.problem.theta, self.tasks, &owners, self.limits);
+        self.dispatcher.run(kind, &self.problem.theta, self.tasks, &owners, self.limits)
     }
 
     /// Descends in doubled gains, and lists the restarts that come of it and those without one row; the kind of start
     /// of each.
-    fn double(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Vec<Start> {
+    fn double(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Result<Vec<Start>, Stopped> {
         let (n, m) = (self.problem.size, self.problem.rows);
         let scale = self.problem.theta.double.scale.fne;
         self.begin(2);
         for &e in open {
             for complex in [true, false] {
-                far_start(&candidates[e], scale, self.tasks.add(e, complex, candidates[e].reached.scale));
+                far_start(&candidates[e], scale, self.tasks.add(e, complex, candidates[e].reached.scale)?);
             }
         }
         let limits = std::mem::replace(
@@ -135,7 +164,7 @@ impl Search<'_> {
                 longest: LONGEST_STEP * scale,
             },
         );
-        self.descend(Kind::Doubled, candidates);
+        self.descend(Kind::Doubled, candidates)?;
         self.limits = limits;
 
         let doubled = std::mem::replace(self.tasks, std::mem::take(self.doubled));
@@ -148,7 +177,7 @@ impl Search<'_> {
             let (a, b) = doubled.point(task).split_at(m * n);
             let signs = if norm(b) <= BACK * norm(a) { &[0.0][..] } else { &[0.0, 1.0, -1.0] };
             for &sign in signs {
-                let point = self.tasks.add(e, false, 0.0);
+                let point = self.tasks.add(e, false, 0.0)?;
                 for (x, (a, b)) in point.iter_mut().zip(a.iter().zip(b)) {
                     *x = a + sign * b;
                 }
@@ -157,26 +186,26 @@ impl Search<'_> {
             }
             if start == Start::Stacked {
                 for i in 0..m {
-                    scale_rows(n, &candidates[e].initial, &[i], 0.0, self.tasks.add(e, false, 0.0));
+                    scale_rows(n, &candidates[e].initial, &[i], 0.0, self.tasks.add(e, false, 0.0)?);
                     starts.push(Start::Reversed);
                 }
             }
         }
         *self.doubled = doubled;
-        starts
+        Ok(starts)
     }
 
     /// Drops the listed descents of which single precision already shows that they cannot get below the best point; the
     /// rest goes on from where it got.
-    fn screen(&mut self, candidates: &mut [Candidate], starts: &mut Vec<Start>) {
+    fn screen(&mut self, candidates: &mut [Candidate], starts: &mut Vec<Start>) -> Result<(), Stopped> {
         let (width, tasks, screened) = (self.problem.rows * self.problem.size, &mut *self.tasks, &mut *self.doubled);
         screened.clear(width, 1);
         for task in (0..tasks.len()).filter(|&task| candidates[tasks.owner(task)].quick) {
-            screened.add(tasks.owner(task), false, 0.0).copy_from_slice(tasks.point(task));
+            screened.add(tasks.owner(task), false, 0.0)?.copy_from_slice(tasks.point(task));
         }
         let owners: Vec<Owner> = candidates.iter().map(Candidate::owner).collect();
         let limits = Limits { iterations: SCREENING_ITERATIONS, tolerance: FLAT, acceptable: FLAT, ..self.limits };
-        self.dispatcher.run(Kind::Screening, &self.problem.theta, screened, &owners, limits);
+        self.dispatcher.run(Kind::Screening, &self.problem.theta, screened, &owners, limits)?;
         let mut next = 0..screened.len();
         let keep: Vec<bool> = (0..tasks.len())
             .map(|task| {
@@ -194,15 +223,16 @@ impl Search<'_> {
         tasks.retain(&keep);
         let mut keep = keep.iter();
         starts.retain(|_| *keep.next().unwrap_or(&true));
+        Ok(())
     }
 
     /// Makes the listed descents and keeps what is lower; which candidates that changed.
-    fn finish(&mut self, candidates: &mut [Candidate], mut starts: Vec<Start>) -> Vec<usize> {
+    fn finish(&mut self, candidates: &mut [Candidate], mut starts: Vec<Start>) -> Result<Vec<usize>, Stopped> {
         if dispatch::single(&self.problem.theta) {
-            self.screen(candidates, &mut starts);
+            self.screen(candidates, &mut starts)?;
         }
         let owners: Vec<Owner> = candidates.iter().map(Candidate::owner).collect();
-        self.dispatcher.run(Kind::Real, &self.problem.theta, self.tasks, &owners, self.limits);
+        self.dispatcher.run(Kind::Real, &self.problem.theta, self.tasks, &owners, self.limits)?;
         let mut lower = Vec::new();
         for (task, start) in starts.into_iter().enumerate() {
             let e = self.tasks.owner(task);
@@ -211,39 +241,41 @@ impl Search<'_> {
                 lower.push(e);
             }
         }
-        lower
+        Ok(lower)
     }
 
     /// Lists the point `g` of a candidate with one row or two rows reversed.
-    fn reverse(&mut self, e: usize, g: &[f64]) {
+    fn reverse(&mut self, e: usize, g: &[f64]) -> Result<(), Stopped> {
         let (n, m) = (self.problem.size, self.problem.rows);
         let used: Vec<usize> = (0..m).filter(|&i| g[i * n..(i + 1) * n].iter().any(|&x| x != 0.0)).collect();
         for (k, &i) in used.iter().enumerate() {
-            scale_rows(n, g, &[i], -1.0, self.tasks.add(e, false, 0.0));
+            scale_rows(n, g, &[i], -1.0, self.tasks.add(e, false, 0.0)?);
             if m <= PAIRS_UP_TO {
                 for &j in &used[k + 1..] {
-                    scale_rows(n, g, &[i, j], -1.0, self.tasks.add(e, false, 0.0));
+                    scale_rows(n, g, &[i, j], -1.0, self.tasks.add(e, false, 0.0)?);
                 }
             }
         }
+        Ok(())
     }
 
     /// Tries the certificate at the best point of each of `which`.
-    pub(crate) fn certify(&mut self, candidates: &mut [Candidate], which: &[usize]) {
+    pub(crate) fn certify(&mut self, candidates: &mut [Candidate], which: &[usize]) -> Result<(), Stopped> {
         if which.is_empty() {
-            return;
+            return Ok(());
         }
         self.begin(1);
         for &e in which {
-            self.tasks.add(e, false, 0.0).copy_from_slice(&candidates[e].g);
+            self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidates[e].g);
         }
         let limits = self.limits;
         self.limits.iterations = 0;
-        self.descend(Kind::Certified, candidates);
+        self.descend(Kind::Certified, candidates)?;
         self.limits = limits;
         for task in 0..self.tasks.len() {
             candidates[self.tasks.owner(task)].certified = self.tasks.certified(task);
         }
+        Ok(())
     }
 }
 

@@ -6,7 +6,7 @@ use super::super::search::{canonical, variables};
 use super::*;
 use crate::simd::norm;
 
-pub(super) const BACKEND: Backend = Backend { library: false, width: Width::Baseline };
+pub(super) const BACKEND: Backend<'static> = Backend { library: false, width: Width::Baseline, cancel: None };
 pub(super) const LIMITS: Limits =
     Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
 
@@ -62,8 +62,9 @@ pub(super) fn descend(
 ) -> (Vec<f64>, Reached) {
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
-    tasks.add(0, false, 0.0).copy_from_slice(start);
-    minimise(objective, &mut tasks, &[Owner { variables, incumbent }], limits, BACKEND, &mut Workspace::default());
+    tasks.add(0, false, 0.0).expect("memory").copy_from_slice(start);
+    let owners = [Owner { variables, incumbent }];
+    minimise(objective, &mut tasks, &owners, limits, BACKEND, &mut Workspace::default()).expect("memory");
     (tasks.point(0).to_vec(), tasks.reached(0))
 }
 
@@ -120,7 +121,7 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
 fn a_descent_ends_early_only_where_it_cannot_win() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
     each(|problem, variables, g| {
-        let mut real = RealGains::<f64, 0>::new(&problem.theta.double);
+        let mut real = RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory");
         let (end, alone) = descend(&mut real, g, variables, None, LIMITS);
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let mut beside = |value| {
@@ -149,7 +150,7 @@ fn a_descent_ends_early_only_where_it_cannot_win() {
 fn a_descent_ends_where_it_is_back() {
     let (mut steps, mut saved, mut descents) = (0, 0, 0);
     each(|problem, variables, g| {
-        let mut real = RealGains::<f64, 0>::new(&problem.theta.double);
+        let mut real = RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory");
         let (best, found) = descend(&mut real, g, variables, None, LIMITS);
         let near = 1e-3 * norm(&best);
         let mut off = best.clone();

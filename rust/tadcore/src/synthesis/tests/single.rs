@@ -17,17 +17,18 @@ fn screen(
     let coefficients = problem.theta.single.as_ref().expect("a problem in range");
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
-    tasks.add(0, false, 0.0).copy_from_slice(start);
+    tasks.add(0, false, 0.0).expect("memory").copy_from_slice(start);
     let owners = [Owner { variables, incumbent: Some(incumbent) }];
     let limits = Limits { iterations, tolerance: 1e-6, ..LIMITS };
     minimise(
-        &mut RealGains::<f32, 0>::new(coefficients),
+        &mut RealGains::<f32, 0>::new(coefficients, None).expect("memory"),
         &mut tasks,
         &owners,
         limits,
         BACKEND,
         &mut Workspace::default(),
-    );
+    )
+    .expect("memory");
     (tasks.pruned(0), tasks.reached(0).iterations)
 }
 
@@ -38,7 +39,13 @@ fn screen(
 fn only_what_cannot_win_is_pruned() {
     let (mut count, mut saved, mut little) = (0, 0, 0);
     each(|problem, variables, g| {
-        let (end, reached) = descend(&mut RealGains::<f64, 0>::new(&problem.theta.double), g, variables, None, LIMITS);
+        let (end, reached) = descend(
+            &mut RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory"),
+            g,
+            variables,
+            None,
+            LIMITS,
+        );
         let far: Vec<f64> = end.iter().map(|x| 3.0 * x + 1.0).collect();
         let beside = |lower: f64| {
             let incumbent = Incumbent { g: &far, value: reached.value * (1.0 - lower), near: 1e-3 };
@@ -75,7 +82,11 @@ fn out_of_range_everything_is_done_in_double() {
             .collect();
         let solve = |problem: &Problem| {
             let mut all = Vec::new();
-            Synthesizer::new().solve_all(problem, &topologies, Options::default(), |_, gains| all.push(gains));
+            let each = |_, gains| {
+                all.push(gains);
+                Ok(())
+            };
+            Synthesizer::new().solve_all(problem, &topologies, Options::default(), each).expect("memory");
             all
         };
         let within = solve(&problem);
@@ -83,7 +94,8 @@ fn out_of_range_everything_is_done_in_double() {
         for scale in [2.0_f64.powi(40), 2.0_f64.powi(-40)] {
             let r = problem.theta.double.r.iter().map(|r| r * scale).collect();
             let p: Vec<f64> = p.iter().map(|p| p * scale).collect();
-            let scaled = Problem::from_parts(interaction, r, problem.gamma.clone(), &p);
+            let scaled =
+                Problem::from_parts(interaction, r, problem.gamma.clone(), &p, &CancelToken::new()).expect("memory");
             assert!(scaled.theta.single.is_none());
             for ((gains, expected), topology) in solve(&scaled).iter().zip(&within).zip(&topologies) {
                 let theta = gains.theta / (scale * scale);

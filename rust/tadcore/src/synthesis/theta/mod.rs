@@ -14,4 +14,4 @@ mod problem;
 pub use problem::Problem;
 #[cfg(test)]
 pub(crate) use tadcore_kernels::synthesis::theta::Doubled;
-pub(crate) use tadcore_kernels::synthesis::theta::{Coefficients, Precisions, RealGains, Scale};
+pub(crate) use tadcore_kernels::synthesis::theta::{Coefficients, Precisions, RealGains, Scale, TABULATED_UP_TO};

@@ -11,8 +11,11 @@
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
 
-use super::{Coefficients, Precisions, Scale};
+use super::{Coefficients, Precisions, Scale, TABULATED_UP_TO};
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
 use crate::game::{Game, Interaction};
+use crate::memory::{copy, zeros};
 use crate::simd::{norm, sum_of_squares};
 
 /// Everything Θ needs to know of one instant t_k.
@@ -28,27 +31,41 @@ pub struct Problem {
 
 impl Problem {
     /// The problem of `game` at an instant whose Riccati matrices are `p` (all groups, N × N each, one after another).
-    #[must_use]
-    pub fn new(game: &Game, p: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    pub fn new(game: &Game, p: &[f64], cancel: &CancelToken) -> Result<Self, Stopped> {
         let (r, gamma) = (game.constrained_control_weights(), game.weights().gamma.clone());
-        Self::from_parts(game.interaction(), r, gamma, p)
+        Self::from_parts(game.interaction(), r, gamma, p, cancel)
     }
 
     /// The same from its parts: control weights of the constrained players, γ and the Riccati matrices.
     ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    ///
     /// # Panics
     /// When `p` does not hold the interaction's matrices (a programming error).
-    #[must_use]
-    pub fn from_parts(interaction: Interaction, r: Vec<f64>, gamma: Vec<f64>, p: &[f64]) -> Self {
+    pub fn from_parts(
+        interaction: Interaction,
+        r: Vec<f64>,
+        gamma: Vec<f64>,
+        p: &[f64],
+        cancel: &CancelToken,
+    ) -> Result<Self, Stopped> {
         let rows = r.len();
         let size = if interaction == Interaction::I1 { rows + 1 } else { rows };
         let groups = if interaction == Interaction::I1 { 3 } else { 1 };
         assert_eq!(p.len(), groups * size * size, "Riccati matrices of the wrong size");
         let own = &p[..size * size];
         let sign = if interaction == Interaction::I1 { -1.0 } else { 1.0 };
-        let fne: Vec<f64> = (0..rows * size).map(|e| sign * own[e] / r[e / size]).collect();
-        let mut target = vec![0.0; size * size];
+        let mut fne = zeros(WHAT, rows * size)?;
+        for (e, f) in fne.iter_mut().enumerate() {
+            *f = sign * own[e] / r[e / size];
+        }
+        let mut target = zeros(WHAT, size * size)?;
         for i in 0..rows {
+            cancel.check()?;
             let f = &fne[i * size..(i + 1) * size];
             for a in 0..size {
                 for b in 0..size {
@@ -56,19 +73,19 @@ impl Problem {
                 }
             }
         }
-        let coupling: Vec<Vec<f64>> = (1..groups)
-            .filter(|&p| gamma[p] > 0.0)
-            .map(|group| {
-                let matrix = &p[group * size * size..(group + 1) * size * size];
-                let scale = gamma[group].sqrt();
-                (0..rows * size).map(|e| scale * matrix[e]).collect()
-            })
-            .collect();
-        let mut coupling_gram = vec![0.0; rows * rows];
+        let mut coupling: Vec<Vec<f64>> = Vec::new();
+        for group in (1..groups).filter(|&p| gamma[p] > 0.0) {
+            let scale = gamma[group].sqrt();
+            let mut w = copy(WHAT, &p[group * size * size..][..rows * size])?;
+            w.iter_mut().for_each(|x| *x *= scale);
+            coupling.push(w);
+        }
+        let mut gram = zeros(WHAT, rows * rows)?;
         for w in &coupling {
             for i in 0..rows {
+                cancel.check()?;
                 for j in 0..rows {
-                    coupling_gram[i * rows + j] += (0..size).map(|a| w[i * size + a] * w[j * size + a]).sum::<f64>();
+                    gram[i * rows + j] += (0..size).map(|a| w[i * size + a] * w[j * size + a]).sum::<f64>();
                 }
             }
         }
@@ -81,7 +98,9 @@ impl Problem {
                 gamma[term] * r[i] * r[i]
             })
             .collect();
-        let quadratic = [1.0, -1.0].map(|sign| constant(size, sign, &coupling, &coupling_gram, &closeness));
+        let quadratic = [1.0, -1.0].map(|sign| {
+            if size > TABULATED_UP_TO { Vec::new() } else { constant(size, sign, &coupling, &gram, &closeness) }
+        });
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |a: f64, &b| a.max(b));
         let (size_of_f, size_of_m) = (norm(&fne), norm(&target));
         let of_w: f64 = coupling.iter().map(|w| sum_of_squares(w)).sum();
@@ -97,8 +116,8 @@ impl Problem {
         let strength = r.iter().map(|r| 4.0 * gamma[0] * r).collect();
         let first = gamma[0];
         let double =
-            Coefficients { size, rows, first, strength, r, fne, target, coupling, closeness, quadratic, scale };
-        Self { interaction, size, rows, gamma, theta: double.into() }
+            Coefficients { size, rows, first, strength, r, fne, target, coupling, gram, closeness, quadratic, scale };
+        Ok(Self { interaction, size, rows, gamma, theta: double.into() })
     }
 
     /// N.
@@ -121,38 +140,28 @@ impl Problem {
 
     /// The squared residual norms of the gain rows `g`, unweighted and reduced, in the order of γ:
     /// ‖ΔQ_d‖², ‖ΔQ_τ‖², ‖ΔQ_a‖², ‖S₁‖² in I1 (`p`: the Riccati matrices of the instant) and ‖ΔQ‖², ‖S₂‖², ‖S₃‖² in I2.
-    #[must_use]
-    pub fn terms(&self, p: &[f64], g: &[f64]) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory, or `cancel` was raised.
+    pub fn terms(&self, p: &[f64], g: &[f64], cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
         let (n, m, of) = (self.size, self.rows, &self.theta.double);
-        let delta: Vec<f64> = g.iter().zip(&of.fne).map(|(g, f)| g - f).collect();
+        let mut delta = copy(WHAT, g)?;
+        delta.iter_mut().zip(&of.fne).for_each(|(d, f)| *d -= f);
         let closeness = |rows: std::ops::Range<usize>| -> f64 {
             rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (of.r[i] * d).powi(2))).sum()
         };
-        let mut quadratic = 0.0;
-        for a in 0..n {
-            for b in 0..n {
-                let gain: f64 = (0..m).map(|i| of.r[i] * g[i * n + a] * g[i * n + b]).sum();
-                quadratic += (gain - of.target[a * n + b]).powi(2);
-            }
+        let mut product = zeros(WHAT, n * n)?;
+        multiply(n, Some(&of.r), g, g, &mut product, cancel)?;
+        let quadratic = product.iter().zip(&of.target).map(|(gain, m)| (gain - m).powi(2)).sum();
+        if self.interaction == Interaction::I2 {
+            return Ok(vec![quadratic, closeness(0..m - 1), closeness(m - 1..m)]);
         }
-        match self.interaction {
-            Interaction::I2 => vec![quadratic, closeness(0..m - 1), closeness(m - 1..m)],
-            Interaction::I1 => {
-                let coupled = |group: usize| -> f64 {
-                    let matrix = &p[group * n * n..(group + 1) * n * n];
-                    let product =
-                        |a: usize, b: usize| -> f64 { (0..m).map(|i| matrix[i * n + a] * delta[i * n + b]).sum() };
-                    let mut sum = 0.0;
-                    for a in 0..n {
-                        for b in 0..n {
-                            sum += (product(a, b) + product(b, a)).powi(2);
-                        }
-                    }
-                    sum
-                };
-                vec![quadratic, coupled(1), coupled(2), closeness(0..m)]
-            }
-        }
+        let mut coupled = |group: usize| -> Result<f64, Stopped> {
+            multiply(n, None, &p[group * n * n..][..m * n], &delta, &mut product, cancel)?;
+            let pair = |e: usize| product[e] + product[e % n * n + e / n];
+            Ok((0..n * n).map(|e| pair(e).powi(2)).sum())
+        };
+        Ok(vec![quadratic, coupled(1)?, coupled(2)?, closeness(0..m)])
     }
 
     /// Θ = γ · terms.
@@ -161,6 +170,29 @@ impl Problem {
         self.gamma.iter().zip(terms).map(|(g, t)| g * t).sum()
     }
 }
+
+/// out = Σ_i r_i left_iᵀ right_i, rows of N each; without r where there is none.
+fn multiply(
+    n: usize,
+    r: Option<&[f64]>,
+    left: &[f64],
+    right: &[f64],
+    out: &mut [f64],
+    cancel: &CancelToken,
+) -> Result<(), Stopped> {
+    out.fill(0.0);
+    for (i, (left, right)) in left.chunks_exact(n).zip(right.chunks_exact(n)).enumerate() {
+        cancel.check()?;
+        for (row, &l) in out.chunks_exact_mut(n).zip(left) {
+            let l = r.map_or(l, |r| r[i] * l);
+            row.iter_mut().zip(right).for_each(|(x, r)| *x += l * r);
+        }
+    }
+    Ok(())
+}
+
+/// What asks for memory here.
+const WHAT: &str = "the synthesis problem of one instant";
 
 /// The constant part of the Hessian, by the sign of its second term.
 fn constant(n: usize, sign: f64, coupling: &[Vec<f64>], gram: &[f64], closeness: &[f64]) -> Vec<f64> {

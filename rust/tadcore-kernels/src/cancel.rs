@@ -9,6 +9,13 @@ use crate::error::Cancelled;
 #[derive(Debug, Clone, Default)]
 pub struct CancelToken(Arc<AtomicBool>);
 
+/// Whether there is a token and somebody raised it.
+#[inline(always)]
+#[must_use]
+pub fn raised(token: Option<&CancelToken>) -> bool {
+    token.is_some_and(CancelToken::is_cancelled)
+}
+
 impl CancelToken {
     /// A token that nobody has raised.
     #[must_use]
