@@ -77,6 +77,8 @@ class Game:
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64]]: ...
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
+    def table_length(self, start: bytes) -> int:
+        """Bytes of the saved table that begins with these (40 at least); ValueError where it is not this game's."""
     def load_table(self, table: bytes) -> int:
         """Add the entries of a saved table; ValueError for one that is not this game's. The entries held now."""
     def table(self) -> dict[str, int]: ...

@@ -250,6 +250,13 @@ fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
         assert_eq!(second.policy.table().misses, 0);
 
         let load = |bytes: &[u8]| second.policy.load_transitions(bytes, &CancelToken::new());
+        // Its first bytes say how long it is, so that nothing longer need be read.
+        assert_eq!(second.policy.transitions_length(&bytes[..40]), Ok(bytes.len() as u64));
+        let mut vast = bytes.clone();
+        vast[32..40].copy_from_slice(&u64::MAX.to_le_bytes());
+        assert!(matches!(load(&vast), Err(TableError::TooMany { found: u64::MAX, .. })));
+        let small = case(Interaction::I1, n, 2, 40, true, 1000);
+        assert!(matches!(small.policy.transitions_length(&bytes[..40]), Err(TableError::TooMany { .. })));
         assert_eq!(load(&[]), Err(TableError::Foreign));
         assert_eq!(
             make(Interaction::I2, n).policy.load_transitions(&bytes, &CancelToken::new()),

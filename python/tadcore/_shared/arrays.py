@@ -19,17 +19,35 @@ Integers: TypeAlias = NDArray[np.int64]
 _LISTED = 20
 
 
-def as_real(field: str, values: ArrayLike, rule: str) -> Floats:
-    """A C-contiguous float64 array from real numbers; strings, bools, ragged lists and masked entries are refused."""
+def as_plain_array(field: str, values: Any, rule: str) -> NDArray[Any]:
+    """An array of NumPy's own class, of any kind of entries; ragged lists and masked entries are refused."""
     try:
-        array = np.asarray(values)
-    except (ValueError, TypeError) as error:
+        hidden = _masked(values)
+        array = np.asarray(None if hidden else values)
+    except MemoryError:
+        raise
+    except Exception as error:  # ragged, or an object that says it is an array and is none
         raise ScenarioError(field, values, rule) from error
-    if ma.is_masked(values):
+    if hidden:
         raise ScenarioError(field, "an array with masked entries", rule)
-    if array.dtype.kind not in "iuf" and array.size > 0:
+    return array
+
+
+def _masked(values: Any) -> bool:
+    """Whether an entry is masked, also of an array within lists, whose mask NumPy would pass over."""
+    if isinstance(values, list | tuple):
+        return any(_masked(entry) for entry in values if isinstance(entry, list | tuple | ma.MaskedArray))
+    return isinstance(values, ma.MaskedArray) and ma.is_masked(values)
+
+
+def as_real(field: str, values: ArrayLike, rule: str) -> Floats:
+    """A C-contiguous, aligned float64 array from real numbers; strings, bools, ragged and masked ones are refused."""
+    array = as_plain_array(field, values, rule)
+    if array.size == 0:
+        return np.empty(array.shape)
+    if array.dtype.kind not in "iuf":
         raise ScenarioError(field, values, rule)
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return np.require(array, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
 
 
 def refuse_where(field: str, array: NDArray[Any], bad: NDArray[np.bool_], rule: str) -> None:
@@ -61,19 +79,17 @@ def as_positions(values: ArrayLike, shape: tuple[int, ...], *, rows: bool = Fals
 def shape_of(values: Any) -> tuple[int, ...]:
     """The shape of anything array-like; empty for a ragged list."""
     try:
-        return np.shape(values)
-    except ValueError:
+        shape = np.shape(values)
+    except Exception:
         return ()
+    return shape if isinstance(shape, tuple) else ()  # a class has something else there
 
 
 def as_adjacency(values: Any, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """A fresh 0-1 matrix of `shape` as bools; a `VisibilityNetwork` stands for its 𝒜."""
     rule = f"a matrix of 0 and 1 of shape {shape}: row i whom player i sees, entry i the attacker"
     values = getattr(values, "adjacency", values)
-    try:
-        array = np.asarray(values)
-    except (ValueError, TypeError) as error:
-        raise ScenarioError("adjacency", values, rule) from error
+    array = as_plain_array("adjacency", values, rule)
     if array.shape != shape:
         raise ScenarioError("adjacency", f"shape {array.shape}", rule)
     if array.dtype.kind not in "biuf":

@@ -1,23 +1,21 @@
-"""Reading TOML with errors that name the line, and writing files that appear whole or not at all."""
+"""Paths from outside, and files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import errno
 import os
-import re
 import secrets
 import shutil
 import stat
 import sys
 import tempfile
 import time
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from tadcore.errors import MISSING, ScenarioError
+from tadcore.errors import ScenarioError
 
 MOST = 8 << 20
 """Bytes of a text file that is read at all: what a reader makes of it takes many times as much."""
@@ -33,19 +31,24 @@ _REFUSED = (
 _THROUGH = os.O_WRONLY | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_NONBLOCK", 0)
 _PATIENCE = 10.0  # seconds until a pipe without a reader is refused
 _LINKS = 40  # in a chain, as many as Linux follows
-_DEEPEST = 100
-_PART = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
-# A dotted key of n parts takes the parser n² of memory.
-_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{_DEEPEST}}}")
 _KINDS = ((stat.S_ISREG, None), (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
 
 
 def as_path(field: str, value: Any) -> Path:
     """A path from a string or a path; raises `ScenarioError` for what cannot name anything."""
     name = value if isinstance(value, str) else value.__fspath__() if isinstance(value, os.PathLike) else None
-    if not isinstance(name, str) or not name or "\0" in name:
+    if not isinstance(name, str) or not name or "\0" in name or not _encodable(name):
         raise ScenarioError(field, value, "a path: a string or a pathlib.Path, without \\0")
     return Path(name)
+
+
+def _encodable(name: str) -> bool:
+    """Whether the system can write the name: not where it holds half of a surrogate pair."""
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def strange(path: str | os.PathLike[str]) -> str | None:
@@ -57,57 +60,14 @@ def strange(path: str | os.PathLike[str]) -> str | None:
     return next((word for holds, word in _KINDS if holds(mode)), "a device")
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a file; raises `ScenarioError` where there is none."""
-    file = as_path("path", path)
-    name = os.fspath(path)
-    try:
-        found = strange(file)
-        if found is not None:
-            raise ScenarioError(name, found, "a file")
-        with file.open("rb") as stream:
-            data = stream.read(MOST + 1)
-        if len(data) > MOST:
-            raise ScenarioError(name, "a larger one", f"a file of at most {MOST >> 20} MiB")
-        return data.decode("utf-8-sig")
-    except FileNotFoundError:
-        raise ScenarioError(name, MISSING, "a file that exists") from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(name, error.object[error.start : error.end], "text in UTF-8") from None
-    except OSError as error:
-        raise ScenarioError(name, error.strerror or str(error), "a file that can be read") from None
-
-
-def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML text; raises `ScenarioError` naming the line that cannot be read."""
-    long = _LONG_KEY.search(text)
-    if long is not None:
-        line = text.count("\n", 0, long.start()) + 1
-        raise ScenarioError(f"{name}, line {line}", long[0], f"valid TOML with keys of at most {_DEEPEST} parts")
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a TOMLDecodeError, or a number or a nesting beyond all bounds
-        place = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        reason = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
-        if "digits" in reason:
-            reason = "an integer has too many digits"
-        if isinstance(error, RecursionError):
-            reason = "arrays or tables are nested too deeply"
-        if place is None:
-            last = "at end of document" in str(error)
-            raise ScenarioError(f"{name}, at the end" if last else name, MISSING, f"valid TOML ({reason})") from None
-        line = int(place[1])
-        found = text.split("\n")[line - 1].strip() if line <= text.count("\n") + 1 else MISSING
-        raise ScenarioError(f"{name}, line {line}", found, f"valid TOML ({reason})") from None
-
-
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A file to write to, whose content the destination has if the block succeeds, and has nothing of if not.
 
     * A regular file, or a name that is free: the content is written beside it, brought to the disk and renamed, so no
       reader meets half a file. A file that was there keeps its mode and, where the system lets it, its owner; a new one
-      has the mode that the umask gives.
+      has the mode that the umask gives. Its other names (hard links) keep the old content. A file that is a mount point
+      can only be written in place.
     * A symbolic link stays, and what it leads to is written.
     * A device, a pipe, ``/dev/stdout`` or another open descriptor receives the content, and stays what it is.
 
@@ -174,7 +134,13 @@ def _beside(target: Path, there: os.stat_result | None, suffix: str) -> Iterator
             os.fsync(stream.fileno())
         if there is not None:
             _dress(partial, there, mode)
-        partial.replace(target)
+        try:
+            partial.replace(target)
+        except OSError as error:
+            if error.errno != errno.EBUSY:
+                raise
+            shutil.copyfile(partial, target)  # a single file mounted into a container cannot be another file
+            partial.unlink()
     except BaseException:
         with suppress(OSError):
             partial.unlink()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_amount
 from tadcore.errors import ScenarioError
 from tadcore.simulation.batch import Batch
 from tadcore.statistics.radius import Breakpoints
@@ -15,7 +15,7 @@ from .replays import Replays
 
 def breakpoints(games: Replays, grid: Floats, played: list[Batch], tolerance: float) -> Breakpoints:
     """Bisect every change between neighbouring radii, all trials at once."""
-    if not 0.0 < tolerance < np.inf:
+    if not as_amount("tolerance", tolerance) > 0.0:
         raise ScenarioError("tolerance", tolerance, "a positive number")
     codes = np.array([_code(batch) for batch in played])
     cell, trial = np.nonzero(codes[1:] != codes[:-1])

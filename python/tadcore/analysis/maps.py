@@ -17,9 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
-from tadcore._shared.files import destination, write_whole
+from tadcore._shared.files import as_path, destination, write_whole
+from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
@@ -32,6 +35,11 @@ if TYPE_CHECKING:
 
 _BLOCK = 1 << 16
 """Starts played at once: some megabytes of positions, and enough work for any number of threads."""
+
+_MOST_ON_AN_AXIS = 100_000
+_MOST = 200_000_000  # places: 13 bytes each
+_FINEST = 1e-12  # of the ends, between neighbours: closer ones are not told apart in a figure
+_SMALLEST = 1e-100
 
 _FIGURES = {".png", ".pdf", ".svg"}
 
@@ -75,21 +83,17 @@ class OutcomeMap:
         ScenarioError
             The file name ends in something else.
         """
-        target = Path(path)
+        target = as_path("path", path)
         check_destination("path", target)
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.suffix == ".nc":
             write_whole(target, bytes(self.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
             return target
-        import matplotlib.pyplot as plt
-
         from tadcore import plotting
+        from tadcore.plotting.tools.axes import for_files, root_figure
 
-        with plotting.style():
-            figure = self.plot(**options).get_figure(root=True)
-            assert figure is not None
-            plotting.save(figure, target.with_suffix(""), formats=[target.suffix[1:]])
-            plt.close(figure)
+        with for_files(), plotting.style():
+            plotting.save(root_figure(self.plot(**options)), target.with_suffix(""), formats=[target.suffix[1:]])
         return target
 
     def __repr__(self) -> str:
@@ -148,10 +152,9 @@ def outcome_map(
 
     from tadcore.scenario.provenance import provenance
 
-    player = label(player)
-    if player not in sc.players:
-        raise ScenarioError("player", player, f"one of {', '.join(sc.players)}")
-    columns, rows, up = axis_of_grid("x", x), axis_of_grid("y", y), height(sc, player, z)
+    as_scenario(sc)
+    player = one_of("player", label(player), sc.players)
+    (columns, rows), up = grid_of(x, y), height(sc, player, z)
     who = sc.players.index(player)
     shape = (len(rows), len(columns))
     kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
@@ -210,14 +213,27 @@ def height(sc: Scenario, player: str, z: float | None) -> float | None:
     return float(sc.positions[sc.players.index(player), 2] if z is None else z)
 
 
-def axis_of_grid(field: str, given: Sequence[Any]) -> Floats:
+def grid_of(x: Sequence[Any], y: Sequence[Any]) -> tuple[Floats, Floats]:
+    """The places of both axes of a grid, each from (low, high, count)."""
+    columns, rows = _axis("x", x), _axis("y", y)
+    if len(columns) * len(rows) > _MOST:
+        raise ScenarioError("x, y", f"{len(columns) * len(rows):,} places", f"a grid of at most {_MOST:,} places")
+    return columns, rows
+
+
+def _axis(field: str, given: Sequence[Any]) -> Floats:
     """The places of one axis of a grid, from (low, high, count)."""
     try:
         low, high, count = given
         ends = float(low), float(high)
     except (TypeError, ValueError):
         raise ScenarioError(field, given, "(low, high, count)") from None
-    number = as_index(f"{field}[2]", count, 100_000, least=1)
-    if not all(map(math.isfinite, ends)) or ends[0] > ends[1] or (ends[0] == ends[1]) != (number == 1):
+    number = as_index(f"{field}[2]", count, _MOST_ON_AN_AXIS, least=1)
+    for end in ends:
+        if not COORDINATE.holds(end):
+            raise ScenarioError(field, given, f"(low, high, count), each end {COORDINATE.words}")
+    if ends[0] > ends[1] or (ends[0] == ends[1]) != (number == 1):
         raise ScenarioError(field, given, "(low, high, count) with low < high, or one place with low = high")
+    if number > 1 and not (ends[1] - ends[0]) / (number - 1) >= _FINEST * max(abs(ends[0]), abs(ends[1]), _SMALLEST):
+        raise ScenarioError(field, given, f"(low, high, count) with places at least {_FINEST:g} of the ends apart")
     return np.linspace(*ends, number)

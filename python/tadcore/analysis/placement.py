@@ -5,7 +5,8 @@ numbers. So P, as estimated from M fixed trials, is a function of the start with
 optimiser can search; differences between starts are better known than the probabilities themselves.
 
 - **Pointwise** intervals are Clopper and Pearson's; **bands** hold at all places of the grid at once, for one outcome:
-  Clopper and Pearson's at 1 - (1 - level) / places (Bonferroni).
+  Clopper and Pearson's at 1 - (1 - level) / places (Bonferroni). Of a study that a rule was asked to stop, both are
+  confidence sequences instead.
 - The start that an optimiser returns was chosen for the trials that it was chosen with, so its share there is too
   high. `best_start` therefore plays it again with fresh trials, and reports those.
 """
@@ -20,13 +21,16 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.progress import bar
+from tadcore._shared.shares import estimate
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.statistics import TrialOutcomes, difference_interval, outcome_names, proportion_interval
+from tadcore.statistics.intervals import Method, band, ends
 from tadcore.statistics.outcomes import as_level
+from tadcore.statistics.stopping import level_of, stopping_of
 from tadcore.study.study import Study
 
-from .maps import axis_of_grid, height
+from .maps import grid_of, height
 from .replays import Placed
 
 if TYPE_CHECKING:
@@ -98,9 +102,12 @@ class ProbabilityMap:
     def __repr__(self) -> str:
         _, rows, columns = self.dataset["estimate"].shape
         best = self.best()
+        share, interval = estimate(best["estimate"], best["low"], best["high"])
+        rule = self.dataset.attrs.get("rule")
+        by = f"; {rule}" if rule else ""
         return (
             f"ProbabilityMap(start of {self.player} on {columns} × {rows} places, {self.trials:,} trials each: "
-            f"P(intercepted) up to {best['estimate']:.4g} at ({best['x']:g}, {best['y']:g}))"
+            f"P(intercepted) up to {share} {interval} at ({best['x']:g}, {best['y']:g}){by})"
         )
 
 
@@ -111,7 +118,7 @@ def probability_map(
     x: tuple[float, float, int],
     y: tuple[float, float, int],
     z: float | None = None,
-    level: float = 0.95,
+    level: float | None = None,
     threads: int | None = None,
     progress: bool = False,
 ) -> ProbabilityMap:
@@ -127,8 +134,8 @@ def probability_map(
         The grid: ``count`` places from ``low`` to ``high``, both included.
     z : float, optional
         In space, the height of the plane of the grid; the player's own by default.
-    level : float
-        Confidence level of intervals and bands.
+    level : float, optional
+        Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop the study.
     threads : int, optional
         Worker threads; all cores by default.
     progress : bool
@@ -160,9 +167,10 @@ def probability_map(
 
     from tadcore.scenario.provenance import provenance
 
-    confidence = as_level(level)
+    stopping = stopping_of(source)
+    confidence = level_of(stopping, level)
     games = Placed(source, player, threads)
-    sc, columns, rows = games.sc, axis_of_grid("x", x), axis_of_grid("y", y)
+    sc, (columns, rows) = games.sc, grid_of(x, y)
     up = height(sc, games.player, z)
     places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     if up is not None:
@@ -173,9 +181,9 @@ def probability_map(
         block = slice(first, first + together)
         count[:, block] = games.events(places[block]).sum(axis=2)
     names = outcome_names(sc.n)
-    low, high = proportion_interval(count, games.trials, level=confidence, method="exact")
-    band = 1.0 - (1.0 - confidence) / len(places)
-    band_low, band_high = proportion_interval(count, games.trials, level=band, method="exact")
+    method: Method = "exact" if stopping is None else "sequence"
+    low, high = ends(count, games.trials, 1.0 - confidence, method)
+    band_low, band_high = band(count, games.trials, 1.0 - confidence, len(places), method)
     shape = (len(names), len(rows), len(columns))
     values = {"count": count, "estimate": count / games.trials, "low": low, "high": high}
     values |= {"band_low": band_low, "band_high": band_high}
@@ -196,6 +204,7 @@ def probability_map(
                 "player": games.player,
                 "trials": games.trials,
                 "level": confidence,
+                **({} if stopping is None else {"rule": str(stopping)}),
                 **({} if up is None else {"z": up}),
                 **provenance(sc),
             },
@@ -246,10 +255,11 @@ class BestStart:
 
     def __repr__(self) -> str:
         place = ", ".join(f"{value:.4g}" for value in self.position)
+        share = " ".join(estimate(self.estimate, self.low, self.high))
+        gain = " ".join(estimate(self.gain, self.gain_low, self.gain_high, sign=True))
         return (
-            f"BestStart({self.player} at ({place}): P({self.outcome}) = {self.estimate:.4g} "
-            f"[{self.low:.4g}, {self.high:.4g}] on {self.trials:,} fresh trials; "
-            f"{self.gain:+.4g} [{self.gain_low:+.4g}, {self.gain_high:+.4g}] beside its own start; "
+            f"BestStart({self.player} at ({place}): P({self.outcome}) = {share} on {self.trials:,} fresh trials; "
+            f"{gain} beside its own start; "
             f"{self.evaluations:,} places searched)"
         )
 
@@ -325,6 +335,9 @@ def best_start(
     fresh_seed = (study.seed + 1) % 2**64 if seed is None else as_index("seed", seed, 2**64 - 1)
     if fresh_seed == study.seed:
         raise ScenarioError("seed", seed, "another than the study's own: the fresh trials must be new")
+    again = study.replace(seed=fresh_seed)
+    for one in (study, again):
+        one.check(progress=progress)
     games = Placed(study, player, threads)
     which = outcome_names(games.sc.n).index(as_outcome(outcome, games.sc.n))
     bounds = _bounds(games.sc, x, y, z)
@@ -340,7 +353,7 @@ def best_start(
     found = direct(loss, bounds, maxfun=most, maxiter=most, vol_tol=0.0, len_tol=0.0)
     for _ in steps:
         pass
-    fresh = Placed(study.replace(seed=fresh_seed), player, threads)
+    fresh = Placed(again, player, threads)
     events = fresh.events(np.array([found.x, fresh.own]))[which]
     hits, own = int(events[0].sum()), int(events[1].sum())
     low, high = proportion_interval(hits, fresh.trials, level=confidence, method="exact")

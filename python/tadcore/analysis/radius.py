@@ -9,10 +9,11 @@ player i to another at some instant of the grid, and between two such distances 
 monotone* in general: a defender that sees further plays another game from that moment on, and may lose what it would
 have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or bisection over the whole range is used.
 
-- **Pointwise** intervals are Wilson's; **bands** hold at all R radii at once, for one outcome: Wilson's at
-  1 - (1 - level) / R (Bonferroni).
+- **Pointwise** intervals are Wilson's; **bands** hold at all R radii at once, for one outcome: Clopper and Pearson's
+  exact intervals, each with (1 - level) / R (Bonferroni, whatever the dependence between radii).
 - **Differences** against a reference radius and **slopes** between neighbouring radii, the value of a unit of radius,
-  :math:`(P(r_{k+1}) - P(r_k)) / (r_{k+1} - r_k)`, carry paired score intervals.
+  :math:`(P(r_{k+1}) - P(r_k)) / (r_{k+1} - r_k)`, carry paired score intervals, each by itself.
+- Of a study that a rule was asked to stop, all of these are confidence sequences instead.
 - **Breakpoints**, on request: for each trial and each pair of neighbouring radii with different outcomes, bisection
   finds a radius at which the outcome changes, and continues until the changes found lead from the one outcome to the
   other. A pair of neighbours with the same outcome is taken to hold none; a finer grid sees more.
@@ -20,30 +21,35 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
-from tadcore.statistics import TrialOutcomes, outcome_names, proportion_interval
+from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
-from tadcore.statistics.outcomes import as_level, indicators
+from tadcore.statistics.intervals import band, ends
+from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
+from tadcore.statistics.stopping import level_of, stopping_of
+from tadcore.study.study import Study
 
 from .breakpoints import breakpoints
 from .replays import Replays, starts_of
 
 
 def radius_curve(
-    source: Scenario | TrialOutcomes,
+    source: Scenario | Study | TrialOutcomes,
     positions: ArrayLike | None = None,
     *,
     player: str = "d1",
     radii: ArrayLike,
     kind: RadiusKind = "visibility",
     reference: float | None = None,
-    level: float = 0.95,
+    level: float | None = None,
     refine: bool = False,
     tolerance: float = 1e-9,
     threads: int | None = None,
@@ -53,9 +59,9 @@ def radius_curve(
 
     Parameters
     ----------
-    source : Scenario or StudyResult
-        The game, or a finished study whose trials are played again; what the study varies stays varied, but for the
-        radius in question.
+    source : Scenario, Study or StudyResult
+        The game, or a study whose trials are played, again or for the first time. What it varies stays varied, but for
+        the radius in question.
     positions : array_like, shape (M, n + 2, dim), optional
         M independent starts; required with a Scenario, and not taken with a study.
     player : str
@@ -68,7 +74,7 @@ def radius_curve(
     reference : float, optional
         The radius to take differences against; the scenario's own by default.
     level : float
-        Confidence level of intervals and bands.
+        Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop the study.
     refine : bool
         Whether to find, for each trial, the radii at which its outcome changes.
     tolerance : float
@@ -90,12 +96,15 @@ def radius_curve(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
-    confidence = as_level(level)
+    stopping = stopping_of(source)
+    confidence = level_of(stopping, level)
     sc, rows = starts_of(source, positions)
     games = Replays(sc, rows, player, kind, threads)
     grid = games.checked("radii", radii)
-    if grid.ndim != 1 or grid.size == 0 or np.any(np.diff(grid) <= 0.0):
+    if grid.ndim != 1 or grid.size == 0 or np.any(grid[1:] <= grid[:-1]):
         raise ScenarioError("radii", radii, "a list of increasing radii")
+    if reference is not None and np.ndim(reference):
+        raise ScenarioError("reference", reference, "one radius")
     own = games.own if reference is None else float(games.checked("reference", reference))
     played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {games.player}", show=progress)]
     same = np.flatnonzero(grid == own)
@@ -111,11 +120,12 @@ def radius_curve(
         against_last.append(discordant(event, last))
         last = event
     count = np.array(counts).T
-    low, high = proportion_interval(count, len(rows), level=confidence)
-    together = 1.0 - (1.0 - confidence) / len(grid)
-    band_low, band_high = proportion_interval(count, len(rows), level=together)
-    difference = paired_differences(against_reference, len(rows), confidence)
-    slope = paired_differences(against_last, len(rows), confidence)[..., 1:] / np.diff(grid)
+    error, trials = 1.0 - confidence, len(rows)
+    low, high = ends(count, trials, error, "wilson" if stopping is None else "sequence")
+    band_low, band_high = band(count, trials, error, len(grid), "exact" if stopping is None else "sequence")
+    by: Literal["score", "sequence"] = "score" if stopping is None else "sequence"
+    difference = paired_differences(against_reference, trials, confidence, by)
+    slope = paired_differences(against_last, trials, confidence, by)[..., 1:] / np.diff(grid)
     return RadiusCurve(
         player=games.player,
         radius=kind,
@@ -137,4 +147,5 @@ def radius_curve(
         defender=np.array([batch.defender for batch in played]),
         level=confidence,
         breakpoints=breakpoints(games, grid, played, tolerance) if refine else None,
+        rule="" if stopping is None else str(stopping),
     )

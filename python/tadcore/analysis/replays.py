@@ -39,10 +39,10 @@ class Replays:
 
     def __init__(self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None) -> None:
         player = label(player)
-        if kind not in ("visibility", "capture"):
+        if not isinstance(kind, str) or kind not in ("visibility", "capture"):
             raise ScenarioError("kind", kind, 'one of "visibility" and "capture"')
         labels = sc.constrained if kind == "visibility" else (*sc.players[: sc.n], "attacker")
-        if player not in labels:
+        if not isinstance(player, str) or player not in labels:
             raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
         self.column = component(sc, f"{player}.{kind}_radius").row
         self.sc, self.rows, self.player, self.kind, self.threads = sc, rows, player, kind, threads

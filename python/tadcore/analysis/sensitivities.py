@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component
 from tadcore.simulation.batch import simulate_batch
@@ -45,7 +47,8 @@ def sensitivity(
     level : float
         Confidence level of each interval.
     resamples : int
-        Bootstrap resamples.
+        Bootstrap resamples. With fewer than 2 / (1 - level) - 1 there are no such percentiles, and every interval is
+        [0, 1].
     threads : int, optional
         Worker threads; all cores by default.
 
@@ -61,17 +64,26 @@ def sensitivity(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
+    as_scenario(sc)
+    if not isinstance(inputs, Mapping):
+        raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
     known = (*outcome_names(sc.n), "time")
-    for output in outputs:
-        if output not in known:
-            raise ScenarioError("outputs", output, f"one of {', '.join(known)}")
+    if isinstance(outputs, str) or not isinstance(outputs, Iterable):
+        raise ScenarioError("outputs", outputs, f"a sequence of names, each one of {', '.join(known)}")
+    wanted = tuple(outputs)
+    for output in wanted:
+        one_of("outputs", output, known)
+    taken: dict[str, str] = {}
     for name in inputs:
-        component(sc, name)
+        path = component(sc, name).path
+        if path in taken:
+            raise ScenarioError(f"inputs[{name!r}]", name, f"named once only: {taken[path]!r} is the same number")
+        taken[path] = name
 
     def play(x: Floats) -> Floats:
         rows = rows_of(sc, dict(zip(inputs, x, strict=True)), x.shape[1])
         batch = simulate_batch(sc, rows.positions, rows.visibility_radii, rows.capture_radii, threads=threads)
         found = np.vstack([indicators(batch.kind, batch.defender, sc.n), batch.time])
-        return np.asarray(found[[known.index(output) for output in outputs]], dtype=np.float64)
+        return np.asarray(found[[known.index(output) for output in wanted]], dtype=np.float64)
 
-    return sobol(play, inputs, tuple(outputs), points=points, seed=seed, level=level, resamples=resamples)
+    return sobol(play, inputs, wanted, points=points, seed=seed, level=level, resamples=resamples)

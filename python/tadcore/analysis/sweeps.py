@@ -20,7 +20,7 @@ import numpy as np
 
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import OutcomeKind
-from tadcore.scenario.paths import expand, normal
+from tadcore.scenario.paths import expand, normal, short
 from tadcore.study.collect import StoppingRule
 from tadcore.study.study import Study, StudyResult
 
@@ -84,10 +84,12 @@ class SweepResult:
         Returns
         -------
         xarray.Dataset
-            Its dimensions are the swept paths and ``outcome``. Variables: ``count`` and ``probability`` (the share of
-            the trials) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time of all games) and
-            ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0 and shares and
-            times NaN; ``escape_time`` is NaN everywhere else.
+            Its dimensions are the swept paths, in normal form, and ``outcome``; a defender's path is there in its
+            short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count``, ``probability`` (the
+            share of the trials) with the ends ``low`` and ``high`` of its 95 % interval (as `StudyResult.probabilities`
+            has it, in each cell by itself) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time
+            of all games) and ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0
+            and shares and times NaN; ``escape_time`` is NaN everywhere else.
         """
         import xarray as xr
 
@@ -102,10 +104,12 @@ class SweepResult:
 
         dims = tuple(self.grid)
         by_outcome = (*dims, "outcome")
-        return xr.Dataset(
+        made = xr.Dataset(
             {
                 "count": (by_outcome, over([row[0] for row in rows])),
-                "probability": (by_outcome, over([row[1] for row in rows])),
+                "probability": (by_outcome, over([row[1][0] for row in rows])),
+                "low": (by_outcome, over([row[1][1] for row in rows])),
+                "high": (by_outcome, over([row[1][2] for row in rows])),
                 "mean_time": (by_outcome, over([row[2] for row in rows])),
                 "trials": (dims, over([int(row[0].sum()) for row in rows])),
                 "mean_end": (dims, over([row[3] for row in rows])),
@@ -118,6 +122,10 @@ class SweepResult:
             },
             attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
         )
+        for path in self.grid:
+            if short(path) != path:  # the same values under the name that people write
+                made = made.assign_coords({short(path): (path, made[path].values)}).set_xindex(short(path))
+        return made
 
     def __repr__(self) -> str:
         size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())
@@ -163,7 +171,8 @@ def sweep(
     Raises
     ------
     ScenarioError
-        A path leads nowhere, or a value breaks a rule of scenarios; every cell is checked before any runs.
+        A path leads nowhere, or a value breaks a rule of scenarios; every cell and all its draws are checked before any
+        runs.
 
     Examples
     --------
@@ -178,6 +187,12 @@ def sweep(
     axes = _axes(study, grid)
     points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
     studies = [_cell_study(study, point) for point in points]
+    for point, one in zip(points, studies, strict=True):
+        try:
+            one.check(progress=progress)
+        except ScenarioError as error:
+            error.add_note(f"(in the cell {', '.join(f'{path} = {value!r}' for path, value in point.items())})")
+            raise
     cells = []
     for number, (point, one) in enumerate(zip(points, studies, strict=True), start=1):
         folder = None if store is None else Path(store) / _folder(point)
@@ -232,14 +247,16 @@ def _folder(point: Mapping[str, Any]) -> str:
 
 
 def _summary(result: StudyResult | None, kinds: Sequence[OutcomeKind]) -> tuple[Any, Any, Any, float]:
-    """Counts, shares and mean times by outcome, and the mean time of all."""
+    """Counts, shares with their intervals, and mean times by outcome, and the mean time of all."""
     if result is None:
         nothing = np.full(len(kinds), np.nan)
-        return np.zeros(len(kinds), dtype=np.int64), nothing, nothing, float("nan")
+        return np.zeros(len(kinds), dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
     counts = np.bincount(result.kind, minlength=len(kinds))
     total = np.bincount(result.kind, weights=result.time, minlength=len(kinds))
     means = np.divide(total, counts, out=np.full(len(kinds), np.nan), where=counts > 0)
-    return counts, counts / result.trials, means, float(result.time.mean())
+    found = result.probabilities(level=0.95)
+    shares = [values[: len(kinds)] for values in (found.estimate, found.low, found.high)]
+    return counts, shares, means, float(result.time.mean())
 
 
 def _labels(values: Sequence[Any]) -> list[Any]:

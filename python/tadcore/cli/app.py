@@ -18,7 +18,7 @@ from tadcore.errors import ScenarioError, StoreError, TadcoreError
 
 from .explore import explore
 from .maps import draw_map, write_report
-from .options import FAILED
+from .options import FAILED, set_backend_aside
 from .paper import reproduce
 from .runs import scenarios, simulate, validate
 from .study import study
@@ -85,6 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its answer
+    if arguments is None:
+        set_backend_aside()
     try:
         app(args=None if arguments is None else list(arguments), prog_name="tadcore")
     except ScenarioError as error:

@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 
-from .options import Changes, Source, read
+from .options import Changes, Source, read, writable
 from .terminal import say
+
+MOST_PLACES = 100_000
+"""Places along one axis of a map."""
 
 
 def draw_map(
@@ -24,7 +29,9 @@ def draw_map(
     x: Annotated[tuple[float, float], typer.Option(metavar="LOW HIGH", help="Range of x.")] = (-5.0, 5.0),
     y: Annotated[tuple[float, float], typer.Option(metavar="LOW HIGH", help="Range of y.")] = (-5.0, 5.0),
     z: Annotated[float | None, typer.Option(metavar="HEIGHT", help="In space: the plane of the map.")] = None,
-    size: Annotated[int, typer.Option(metavar="N", help="Places along x; along y in proportion.")] = 400,
+    size: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MOST_PLACES, help="Places along x; along y in proportion.")
+    ] = 400,
     time: Annotated[bool, typer.Option("--time", help="Draw when the game ends, not how.")] = False,
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
@@ -41,22 +48,37 @@ def draw_map(
     from tadcore.analysis.maps import check_destination, outcome_map
 
     check_destination("--out", out)
+    writable("--out", out)
     sc = read(scenario, changes)
-    rows = max(round((size - 1) * (y[1] - y[0]) / (x[1] - x[0])), 1) + 1 if x[1] > x[0] else size
-    found = outcome_map(sc, player, x=(*x, size), y=(*y, rows), z=z, threads=threads, progress=progress)
+    grid = {"x": (*x, size), "y": (*y, _rows(x, y, size))}
+    found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress)
     found.save(out, **({"quantity": "time"} if time else {}))
     total = found.dataset["kind"].size
     say(f"{total:,} places for the start of {player}")
     for name, count in found.counts().items():
-        say(f"{name:<12} {count:>12,}  {count / total:.4f}", indent=2)
+        say(f"{name:<12} {count:>12,}  {share(count / total)}", indent=2)
     say(f"written to {out}")
+
+
+def _rows(x: tuple[float, float], y: tuple[float, float], size: int) -> int:
+    """Places along y for as many along x, in proportion; ranges that are none are left to the map to refuse."""
+    wide, high = x[1] - x[0], y[1] - y[0]
+    if not (math.isfinite(wide) and math.isfinite(high) and wide > 0.0 and high > 0.0):
+        return size
+    rows = (size - 1) * high / wide
+    if not rows < MOST_PLACES:
+        raise ScenarioError("--y", y, f"a range on which --size {size} leaves at most {MOST_PLACES:,} places")
+    return max(round(rows), 1) + 1
 
 
 def write_report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="The store of a study.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("report.html"),
     title: Annotated[str, typer.Option(metavar="TEXT", help="What to call the study.")] = "",
-    level: Annotated[float, typer.Option(metavar="SHARE", help="Confidence level of intervals and bands.")] = 0.95,
+    level: Annotated[
+        float | None,
+        typer.Option(metavar="SHARE", help="Confidence level of intervals and bands; 0.95, or the stopping rule's."),
+    ] = None,
 ) -> None:
     """Write a study as one HTML page: tables, figures and provenance.
 
@@ -67,8 +89,7 @@ def write_report(
     from tadcore.report import report
     from tadcore.study.study import StudyResult
 
-    if out.is_dir():
-        raise ScenarioError("--out", str(out), "a file to write, not a folder")
+    writable("--out", out)
     result = StudyResult.load(folder)
     report(result, out, title=title, level=level)
     say(f"{result.trials:,} trials; written to {out}")

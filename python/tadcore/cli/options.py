@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tadcore import scenarios as bundled
-from tadcore._shared.files import parse_toml
+from tadcore._shared.files import destination
+from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
@@ -18,7 +20,12 @@ FAILED = 1
 UNDECIDED = 3
 """The exit code of a verification in which nothing failed and something could not be decided."""
 
-Source = Annotated[str, typer.Argument(metavar="SCENARIO", help="A TOML file, or the name of a bundled scenario.")]
+_set_aside: list[str] = []
+
+Source = Annotated[
+    str,
+    typer.Argument(metavar="SCENARIO", help="A TOML file, - for standard input, or the name of a bundled scenario."),
+]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Change a field, such as d1.visibility_radius=2; repeatable."),
@@ -33,7 +40,7 @@ def read(source: str, changes: list[str] | None) -> Scenario:
         if not equals:
             raise ScenarioError("--set", change, "PATH=VALUE, such as d1.visibility_radius=2")
         found[path.strip()] = parse_toml(f"value = {value}", f"--set {path}")["value"]
-    sc = bundled.find(source)
+    sc = Scenario.from_toml_string(read_stdin(), name="standard input") if source == STDIN else bundled.find(source)
     return sc.replace(found) if found else sc
 
 
@@ -44,3 +51,35 @@ def usable(out: Path | None) -> None:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ScenarioError("--out", str(out), f"a folder that can be written ({error.strerror})") from None
+
+
+def writable(option: str, out: Path | None) -> None:
+    """Refuse the name of a file that cannot be written before anything is computed."""
+    if out is not None:
+        try:
+            destination(out)
+        except OSError as error:
+            raise ScenarioError(option, str(out), f"a file that can be written ({error.strerror})") from None
+
+
+def set_backend_aside() -> None:
+    """Let matplotlib not look for the backend of MPLBACKEND, which may be one of another Python: files need none."""
+    backend = os.environ.pop("MPLBACKEND", None)
+    if backend:
+        _set_aside.append(backend)
+
+
+def has_windows() -> bool:
+    """Whether a figure of the user's backend opens somewhere; what it is may need a display, or be a notebook's."""
+    import matplotlib as mpl
+    import matplotlib.pyplot as plt
+
+    try:
+        for backend in _set_aside:
+            mpl.use(backend)
+        probe = plt.figure()
+    except Exception:  # there is no such backend, or no display; a toolkit raises its own error
+        return False
+    plt.close(probe)
+    framework = getattr(probe.canvas, "required_interactive_framework", None)
+    return framework is not None or str(plt.get_backend()).lower() == "webagg"

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from tadcore import scenarios as bundled
+from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
 
-from .options import FAILED, Changes, Source, read, usable
-from .terminal import complain, say
+from .options import FAILED, Changes, Source, has_windows, read, usable
+from .terminal import complain, say, spill
 
 
 def simulate(
@@ -20,7 +22,7 @@ def simulate(
     changes: Changes = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there."),
+        typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there; or one file, FILE.nc."),
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw the run: into DIR, or in windows.")] = False,
 ) -> None:
@@ -33,11 +35,16 @@ def simulate(
       tadcore simulate paper-i1 --set 'd*.visibility_radius=inf'
 
     With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
-    --plot also the figures, as PNG and PDF.
+    --plot also the figures, as PNG and PDF. A name that ends in .nc is that file alone.
     """
     sc = read(scenario, changes)
-    usable(out)
-    if plot and out is None and not _has_windows():
+    if out is not None and out.suffix.lower() == ".nc":
+        if plot:
+            raise ScenarioError("--out", str(out), "a folder, into which --plot draws")
+        destination(out)
+    else:
+        usable(out)
+    if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
     from tadcore.simulation.run import simulate as play
 
@@ -65,7 +72,7 @@ def scenarios(
       tadcore scenarios paper-i1 > my.toml
     """
     if name is not None:
-        typer.echo(bundled.text(name), nl=False)
+        spill(bundled.text(name))
         return
     for known in bundled.names():
         say(known)
@@ -99,26 +106,22 @@ def _lines(run: Any, most: int = 20) -> list[str]:
     return [*lines, f"costs J: {costs}"]
 
 
-def _has_windows() -> bool:
-    import matplotlib as mpl
-
-    return str(mpl.get_backend()).lower() not in {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
-
-
 def _draw(run: Any, out: Path | None) -> None:
     """The figures of one run: saved into a folder, or shown."""
-    import matplotlib.pyplot as plt
-
     from tadcore import plotting
+    from tadcore.plotting.tools.axes import for_files
 
-    with plotting.style():
+    with contextlib.nullcontext() if out is None else for_files(), plotting.style():
         drawn = {"trajectories": run.plot.trajectories(), "network": run.plot.network()}
         drawn |= {f"control-{axis}": run.plot.controls(axis=axis) for axis in "xyz"[: run.scenario.dim]}
         drawn |= {name: getattr(run.plot, name)() for name in ("distances", "visibility", "gains", "theta")}
         figures = {name: (axes if hasattr(axes, "figure") else axes.flat[0]).figure for name, axes in drawn.items()}
-        if out is None:
-            plt.show()
-        for name, figure in figures.items():
-            if out is not None:
+        if out is not None:
+            for name, figure in figures.items():
                 plotting.save(figure, out / name)
+            return
+        import matplotlib.pyplot as plt
+
+        plt.show()
+        for figure in figures.values():
             plt.close(figure)

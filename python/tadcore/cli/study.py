@@ -8,13 +8,16 @@ from typing import Annotated
 
 import typer
 
+from tadcore._shared.shares import percent
+from tadcore._shared.toml import STDIN, read_stdin
+
 from .terminal import complain, say
 
 _INTERRUPTED = 130
 
 
 def study(
-    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to vary and how, and the number of trials.")],
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")],
     store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     table: Annotated[
@@ -44,10 +47,14 @@ def study(
 
     Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
     """
+    from tadcore.game.outcome import OutcomeKind
     from tadcore.study.manifest import Manifest
     from tadcore.study.study import Study
 
-    wanted = Study.from_toml(file)
+    if str(file) == STDIN:
+        wanted = Study.from_toml_string(read_stdin(), name="standard input")
+    else:
+        wanted = Study.from_toml(file)
     if resume:
         Manifest.read(store)
     try:
@@ -55,7 +62,9 @@ def study(
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None
+    found = result.probabilities()
     say(f"{result.trials:,} trials")
-    for name, count in result.counts().items():
-        say(f"{name:<12} {count:>12,}  {count / result.trials:.4f}", indent=2)
+    for name, count, share, interval in found.rows()[: len(OutcomeKind)]:
+        say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
+    say(f"intervals: {percent(found.level)} ({found.method})", indent=2)
     say(f"written to {store}")

@@ -9,18 +9,22 @@ from typing import Annotated
 
 import typer
 
-from tadcore._shared.files import destination, write_whole
+from tadcore._shared.files import write_whole
 
-from .options import FAILED, UNDECIDED, Changes, Source, read
+from .options import FAILED, UNDECIDED, Changes, Source, read, writable
 from .terminal import complain, say
+
+_MOST = 1_000_000
 
 
 def verify(
     scenario: Source,
     changes: Changes = None,
-    deviations: Annotated[int, typer.Option(min=0, help="Random deviations of each player.")] = 2,
-    starts: Annotated[int, typer.Option(min=0, help="Random starts of the synthesis at chosen instants.")] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Key of everything random.")] = 0,
+    deviations: Annotated[int, typer.Option(min=0, max=_MOST, help="Random deviations of each player.")] = 2,
+    starts: Annotated[
+        int, typer.Option(min=0, max=_MOST, help="Random starts of the synthesis at chosen instants.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Key of everything random.")] = 0,
     bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
     out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,
 ) -> None:
@@ -35,8 +39,7 @@ def verify(
     """
     from tadcore.verification import verify as check
 
-    if out is not None:
-        destination(out)
+    writable("--json", out)
     report = check(read(scenario, changes), deviations=deviations, starts=starts, seed=seed, bound=bound)
     if out is not None:
         write_whole(out, json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n")

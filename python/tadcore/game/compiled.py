@@ -34,9 +34,16 @@ if hasattr(os, "register_at_fork"):
 
 
 def as_scenario(sc: object) -> Scenario:
-    """Return ``sc``, or say what was given in the place of a scenario."""
+    """Return ``sc``, or say what was given in the place of a scenario; one that was tampered with is refused."""
+    rule = "a Scenario: Scenario.from_toml(path) reads one, scenarios.load(name) too"
     if not isinstance(sc, Scenario):
-        raise ScenarioError("scenario", sc, "a Scenario: Scenario.from_toml(path) reads one, scenarios.load(name) too")
+        raise ScenarioError("scenario", sc, rule)
+    try:
+        valid = Scenario.model_validate(sc)
+    except AttributeError:  # made by __new__ alone
+        raise ScenarioError("scenario", f"a {type(sc).__name__} without fields", rule) from None
+    if valid.__dict__ != sc.__dict__:
+        raise ScenarioError("scenario", "one whose fields were overwritten", rule)
     return sc
 
 

@@ -17,15 +17,18 @@ in the order d1 … dn, target; the paper's matrix is p ⊗ I. Everything is dim
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from tadcore import _core
 from tadcore._shared.arrays import Floats, as_index
-from tadcore.errors import ScenarioError
+from tadcore._shared.text import one_of
 from tadcore.scenario.model import Scenario
 
 from .compiled import game_of
+
+_MOST_AXES = 100
 
 
 class Equilibrium:
@@ -37,7 +40,7 @@ class Equilibrium:
         The grid, t_0 = 0 … t_K = T.
     P : dict of str to ndarray, shape (K + 1, N, N)
         The reduced solution by group: ``"defenders"``, ``"target"``, ``"attacker"`` in I1, ``"team"`` in I2.
-        Read-only.
+        Read-only, in copies and after pickling too.
     integrator_steps : int
         Steps the integrator accepted.
     """
@@ -89,10 +92,21 @@ class Equilibrium:
         ScenarioError
             There is no such group or no such instant.
         """
-        if name not in self.P:
-            raise ScenarioError("name", name, f"one of {', '.join(self.P)}")
+        group = one_of("name", name, self.P)
         k = as_index("k", k, len(self.times) - 1)
-        return np.kron(self.P[name][k], np.eye(self._dim if dim is None else dim))
+        axes = self._dim if dim is None else as_index("dim", dim, _MOST_AXES, least=1)
+        return np.kron(self.P[group][k], np.eye(axes))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a pickle or a copy holds: every number, and not the core's own solution."""
+        state = {**self.__dict__, "residual": self.residual, "feedback": self.feedback}
+        state.pop("_core", None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for solution in self.P.values():
+            solution.flags.writeable = False
 
     def __repr__(self) -> str:
         nodes, size = len(self.times), len(self._players) - 1

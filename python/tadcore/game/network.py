@@ -21,15 +21,17 @@ This is for looking at one instant; runs use the compiled core.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore import _core
-from tadcore._shared.arrays import as_adjacency, as_positions, shape_of
+from tadcore._shared.arrays import as_adjacency, as_index, as_positions, shape_of
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
+
+from .compiled import as_scenario
 
 Edge: TypeAlias = tuple[str, str]
 """Who sees whom, such as ``("d1", "attacker")``."""
@@ -75,6 +77,7 @@ class VisibilityNetwork:
 
         The compiled core decides, by the arithmetic of a run: from states relative to the attacker, in doubles.
         """
+        as_scenario(sc)
         at = sc.positions if positions is None else as_positions(positions, (sc.n + 2, sc.dim))
         return cls(_core.observe(at, sc.visibility_radii))
 
@@ -127,7 +130,8 @@ class VisibilityNetwork:
         relative = np.eye(size, dtype=np.int_)
         relative[:, i] = -1
         relative[i, i] = 1
-        return np.kron(self.adjacency[i].astype(np.int_)[:, None] * relative, np.eye(dim, dtype=np.int_))
+        axes = np.eye(as_index("dim", dim, 100, least=1), dtype=np.int_)
+        return np.kron(self.adjacency[i].astype(np.int_)[:, None] * relative, axes)
 
     @property
     def information_matrix_team(self) -> NDArray[np.int_]:
@@ -148,6 +152,9 @@ class VisibilityNetwork:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, VisibilityNetwork) and np.array_equal(self.adjacency, other.adjacency)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.adjacency,)
 
     def __hash__(self) -> int:
         return hash((self.adjacency.shape, self.adjacency.tobytes()))

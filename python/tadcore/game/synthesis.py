@@ -1,13 +1,13 @@
 """The gains of the players with limited sight at one instant and one network.
 
-The rows g_i of u_i = g_i z minimise Θ₁ (eq:errfun1 of Singh and Reddy) or Θ₂ (eq:errfun2) over what the network lets
-player i use, g_i = K_i 𝓘_i (eq:nwadapt):
+The rows g_i of u_i = g_i z have the lowest Θ₁ (eq:errfun1 of Singh and Reddy) or Θ₂ (eq:errfun2) that a search finds
+over what the network lets player i use, g_i = K_i 𝓘_i (eq:nwadapt), each K_i made of scalars times the identity:
 
     I1  Θ₁ = γ₁‖ΔQ_d‖² + γ₂‖ΔQ_τ‖² + γ₃‖ΔQ_a‖² + γ₄‖S₁‖²   (eq:perfindex)
     I2  Θ₂ = γ₁‖ΔQ‖² + γ₂‖S₂‖² + γ₃‖S₃‖²                     (eq:perfmatzsg)
 
 Norms are Frobenius norms of the reduced factors. The paper's matrices are these ⊗ I, so its Θ is dim times the one
-reported here; the minimiser is the same.
+reported here; among scalars the minimiser is the same. `Gains.certified` tells where it is proved to be global.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
-from .compiled import game_of
+from .compiled import as_scenario, game_of
 from .network import VisibilityNetwork
 
 _TERMS = {"I1": ("dQ_d", "dQ_tau", "dQ_a", "S1"), "I2": ("dQ", "S2", "S3")}
@@ -46,7 +46,7 @@ class Gains:
     K : dict of str to ndarray, shape (dim, dim·N)
         The paper's K_i by player (eq:kpart), zero in the blocks of players that i does not see.
     theta : float
-        Θ₁ or Θ₂ at the minimiser, in reduced norms (the paper's is dim times this).
+        Θ₁ or Θ₂ of these gains, in reduced norms (the paper's is dim times this).
     terms : dict of str to float
         The squared norms that Θ weighs, unweighted: dQ_d, dQ_tau, dQ_a, S1 or dQ, S2, S3.
     weights : dict of str to float
@@ -60,7 +60,7 @@ class Gains:
     gradient_norm : float
         Relative norm of the gradient at the end.
     certified : bool
-        Whether this minimum is proved to be the global one.
+        Whether these gains are proved to be a global minimum of Θ among scalar gains, up to rounding.
     start : {"canonical", "complex", "stacked", "reversed"}
         Starting point of the descent that found it: the canonical one, or a further one of the search.
     """
@@ -129,10 +129,11 @@ def synthesize(
     >>> bool((blind.rows == 0).all())
     True
     """
+    as_scenario(sc)
     shape = (len(sc.constrained), sc.n + 1)
     seen = as_adjacency(adjacency, shape)
     k = as_index("step", step, sc.steps)
-    if method not in ("newton", "descent"):
+    if not isinstance(method, str) or method not in ("newton", "descent"):
         raise ScenarioError("method", method, '"newton" or "descent"')
     limit = None if max_iterations is None else as_index("max_iterations", max_iterations, 2**31 - 1, least=1)
     core = game_of(sc).synthesize(k, seen, method=method, max_iterations=limit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from tadcore._shared.files import write_whole
+from tadcore._shared.files import as_path, destination, write_whole
 from tadcore.errors import ScenarioError
 from tadcore.scenario.provenance import provenance
 
@@ -13,7 +13,7 @@ from .parts import Reported
 from .sections import examples, inputs, notes, origin, outcomes, times
 
 
-def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float = 0.95) -> Path:
+def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float | None = None) -> Path:
     """Write a study as an HTML page.
 
     Parameters
@@ -24,8 +24,8 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
         The file to write, whole or not at all; folders on the way are made.
     title : str
         What to call the study.
-    level : float
-        Confidence level of intervals and bands.
+    level : float, optional
+        Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop.
 
     Returns
     -------
@@ -39,9 +39,10 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    target = Path(out)
+    target = as_path("out", out)
     if target.is_dir():
         raise ScenarioError("out", str(out), "a file to write, not a folder")
+    destination(target)
     sc = result.scenario
     loader = PackageLoader("tadcore.report")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)

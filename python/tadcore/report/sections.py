@@ -12,12 +12,16 @@ import numpy as np
 
 from tadcore import plotting, statistics
 from tadcore._shared.arrays import Floats
+from tadcore._shared.shares import percent
+from tadcore.plotting.tools.axes import for_files
 from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
 from tadcore.statistics.outcomes import indicators
+from tadcore.statistics.stopping import stopping_of
 
 from .parts import Code, Picture, Reported, Row, Section, Table
 
+_INTERVALS = {"wilson": "Wilson intervals", "exact": "exact intervals", "sequence": "confidence sequences"}
 _DPI = 220
 _EXAMPLES = 5
 _LEAST_IN_A_PLANE = 200  # trials; fewer would fill too few cells
@@ -28,7 +32,14 @@ def notes(result: Reported) -> list[str]:
     """What a reader must know before the numbers: a study cut off, or a design that is no random one."""
     found = []
     asked, design = result.study.trials, result.study.design
-    if result.trials < asked:
+    stopping = stopping_of(result)
+    if stopping is not None:
+        found.append(
+            f"The study was {stopping}, which was asked after every {stopping.chunk:,} trials: {result.trials:,} of "
+            f"{asked:,} trials are there. Intervals are those of confidence sequences, and bands hold at every time "
+            "the rule was asked; those of a fixed number of trials would not."
+        )
+    elif result.trials < asked:
         found.append(
             f"{result.trials:,} of {asked:,} trials are there: the study was stopped or cut off before its end."
         )
@@ -40,31 +51,28 @@ def notes(result: Reported) -> list[str]:
     return found
 
 
-def outcomes(result: Reported, level: float) -> Section:
+def outcomes(result: Reported, level: float | None) -> Section:
     """The probability of each outcome."""
-    found = statistics.probabilities(result.kind, result.defender, result.scenario.n, level=level)
-    columns = zip(found.names, found.count, found.estimate, found.low, found.high, strict=True)
-    rows = [_row(name, [f"{n:,}", f"{p:.4f}", f"{low:.4f} – {high:.4f}"]) for name, n, p, low, high in columns]
-    percent = f"{100 * level:g} %"
+    found = statistics.probabilities_of(result, level=level)
+    rows = [_row(name, cells) for name, *cells in found.rows()]
+    share = percent(found.level)
+    named = _INTERVALS[found.method]
     return Section(
         "Outcome probabilities",
-        tables=[Table(f"Outcomes, with {percent} Wilson intervals", ["outcome", "trials", "share", percent], rows)],
-        figures=[_picture(f"Outcome probabilities with {percent} intervals.", plotting.outcome_probabilities, found)],
+        tables=[Table(f"Outcomes, with {share} {named}", ["outcome", "trials", "share", share], rows)],
+        figures=[_picture(f"Outcome probabilities with {share} {named}.", plotting.outcome_probabilities, found)],
     )
 
 
-def times(result: Reported, level: float) -> Section:
+def times(result: Reported, level: float | None) -> Section:
     """The times at which each outcome occurs."""
     sc = result.scenario
-    found = statistics.incidence(
-        result.kind, result.defender, result.time, horizon=sc.horizon, step=sc.step, n=sc.n, level=level
-    )
+    found = statistics.incidence_of(result, level=level)
     rows = []
     for name, ended in zip(found.names, indicators(result.kind, result.defender, sc.n), strict=True):
         if ended.any():
             cells = [f"{t:.6g}" for t in np.quantile(result.time[ended], [0, 0.25, 0.5, 0.75, 1], method="lower")]
             rows.append(_row(name, cells))
-    percent = f"{100 * level:g} %"
     return Section(
         "Termination times",
         tables=[
@@ -77,7 +85,7 @@ def times(result: Reported, level: float) -> Section:
         figures=[
             _picture("Cumulative incidence, stacked; above the areas the games still run.", plotting.incidence, found),
             _picture(
-                f"The same curves, each from zero; every {percent} band holds at all times at once.",
+                f"The same curves, each from zero; every {percent(found.level)} band holds at all times at once.",
                 lambda curves: plotting.incidence(curves, stacked=False),
                 found,
             ),
@@ -168,11 +176,8 @@ def origin(result: Reported) -> Section:
 
 def _picture(caption: str, draw: Callable[[Any], Any], what: Any, *, wide: bool = False) -> Picture:
     """Draw one figure in the style of the package, as a PNG: hatches and curves of many steps make vectors large."""
-    import matplotlib.pyplot as plt
-
     stream = io.BytesIO()
-    with plotting.style():
+    with for_files(), plotting.style():
         figure: Any = np.asarray(draw(what), dtype=object).flat[0].figure
         figure.savefig(stream, format="png", dpi=_DPI)
-        plt.close(figure)
     return Picture(caption, base64.b64encode(stream.getvalue()).decode("ascii"), wide)

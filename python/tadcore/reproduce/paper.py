@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore import _core, scenarios
-from tadcore._shared.files import write_whole
+from tadcore._shared.console import console as terminal
+from tadcore._shared.files import as_path, write_whole
 from tadcore._shared.progress import bar
 from tadcore.simulation.run import Run, simulate
 
@@ -53,13 +54,12 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
         All comparisons. ``report.ok`` is False when a number that must be the paper's is not: all of interaction I1,
         the winners of I2, and what the text states of both.
     """
-    from rich.console import Console
     from rich.text import Text
 
-    target = Path(out)
+    target = as_path("out", out)
     if target.exists() and not target.is_dir():
         raise NotADirectoryError(f"the output folder {str(target)!r} is a file")
-    console = console or Console()
+    console = console or terminal()
     watched = console.is_terminal
     runs = {case.scenario: simulate(scenarios.load(case.scenario)) for case in bar(PUBLISHED, "runs", show=watched)}
     report = Report(rows=compare(runs), version=_core.__version__)

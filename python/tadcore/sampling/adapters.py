@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import as_plain_array, as_real
 from tadcore.errors import MISSING, ScenarioError
 
 from .base import Block, Sampler
@@ -92,6 +93,32 @@ class Variates(Sampler):
         return {"distribution": _name(self.distribution), "draws": _digest(values)}
 
 
+class Resampled(Sampler):
+    """A density estimate, such as `scipy.stats.gaussian_kde`, by its own ``resample``."""
+
+    by_points = False
+
+    def __init__(self, estimate: Any) -> None:
+        self.estimate = estimate
+
+    def __repr__(self) -> str:
+        return f"<{_name(self.estimate)}>"
+
+    def coordinates(self, components: int) -> int:
+        """None: it draws from the stream."""
+        return 0
+
+    def draw(self, block: Block, components: int) -> NDArray[np.float64]:
+        """Whole chunks of variates."""
+        size = len(block.points)
+        return _shaped(_name(self.estimate), self.estimate.resample(size, seed=block.rng).T, size, components)
+
+    def table(self) -> dict[str, Any]:
+        """The class, and a digest of what it draws."""
+        values = self.estimate.resample(_PROBE, seed=generator(0, 0, 0))
+        return {"distribution": _name(self.estimate), "draws": _digest(values)}
+
+
 class Function(Sampler):
     """A callable ``f(rng, size)``."""
 
@@ -155,7 +182,11 @@ def as_sampler(field: str, value: Any) -> Sampler:
         return Quantiles(value)
     if hasattr(value, "rvs"):
         return Variates(value)
-    if callable(value):
+    if hasattr(value, "resample"):
+        return Resampled(value)
+    if callable(value) and not isinstance(value, type):
+        if not _takes(value, 2):
+            raise ScenarioError(field, value, "a callable f(rng, size), which returns one row for each trial")
         return Function(value)
     if isinstance(value, list | tuple | np.ndarray):
         if not np.shape(value) and not isinstance(value, list | tuple):
@@ -216,7 +247,7 @@ def _from_scipy(field: str, table: Mapping[str, Any]) -> Sampler:
     for key, value in parameters.items():
         if key not in known:
             raise ScenarioError(f"{field}.{key}", value, f"left out: {name} has {', '.join(known)}")
-        if np.asarray(value).dtype.kind not in "iuf" or np.ndim(value) > 1:
+        if as_real(f"{field}.{key}", value, "a number, or a list of them").ndim > 1:
             raise ScenarioError(f"{field}.{key}", value, "a number, or a list of them")
     for key in known[:-2]:
         if key not in parameters:
@@ -247,12 +278,29 @@ def _named(field: str, make: Callable[[], Sampler]) -> Sampler:
 
 def _shaped(name: str, values: Any, size: int, components: int) -> NDArray[np.float64]:
     """Check what a callable returned."""
-    array = np.ma.filled(values.astype(np.float64), np.nan) if np.ma.is_masked(values) else np.asarray(values)
+    rule = f"an array of numbers of shape {(size, components)}, one row for each trial"
+    field = f"what {name} returns"
+    try:
+        array = as_plain_array(field, values, rule)
+    except ScenarioError as error:
+        found = error.value if isinstance(error.value, str) else f"a {type(values).__name__} that is no array"
+        raise ScenarioError(field, found, rule) from None
     wanted = {(size, components), (size,)} if components == 1 else {(size, components)}
     if array.dtype.kind not in "iuf" or array.shape not in wanted:
-        rule = f"an array of numbers of shape {max(wanted)}, one row for each trial"
-        raise ScenarioError(f"what {name} returns", f"{array.dtype} of shape {array.shape}", rule)
-    return np.ascontiguousarray(array.reshape(size, components), dtype=np.float64)
+        raise ScenarioError(field, f"{array.dtype} of shape {array.shape}", rule)
+    # A copy: the next draw may be written where this one was.
+    return np.array(array.reshape(size, components), dtype=np.float64, order="C")
+
+
+def _takes(function: Callable[..., Any], arguments: int) -> bool:
+    """Whether a callable takes so many arguments, as far as it can be known."""
+    try:
+        inspect.signature(function).bind(*[None] * arguments)
+    except TypeError:
+        return False
+    except ValueError:  # one that does not say
+        return True
+    return True
 
 
 def _name(thing: Any) -> str:
@@ -262,7 +310,9 @@ def _name(thing: Any) -> str:
 
 def _digest(values: Any) -> str:
     """A digest of values that the last bits, which differ between machines, do not change."""
-    return hashlib.sha256(np.asarray(values, dtype=np.float32).tobytes()).hexdigest()[:16]
+    array = as_real("what a sampler returns", values, "an array of numbers")
+    with np.errstate(over="ignore"):
+        return hashlib.sha256(array.astype(np.float32).tobytes()).hexdigest()[:16]
 
 
 def as_plain(value: Any) -> Any:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tadcore._shared.arrays import as_plain_array, as_real
 from tadcore.errors import ScenarioError
 
 
@@ -74,16 +75,8 @@ class Parameters(Sampler):
 def numbers(field: str, value: ArrayLike | None) -> float | tuple[float, ...]:
     """A finite float, or 2 or 3 of them."""
     rule = "a finite number, or a list of 2 or 3"
-    try:
-        array = np.asarray(value)
-    except (TypeError, ValueError):
-        raise ScenarioError(field, value, rule) from None
-    if (
-        np.ma.is_masked(value)
-        or array.dtype.kind not in "iuf"
-        or array.shape not in ((), (2,), (3,))
-        or not np.isfinite(array).all()
-    ):
+    array = as_plain_array(field, value, rule)
+    if array.dtype.kind not in "iuf" or array.shape not in ((), (2,), (3,)) or not np.isfinite(array).all():
         raise ScenarioError(field, value, rule)
     return float(array) if array.ndim == 0 else tuple(map(float, array))
 
@@ -100,9 +93,9 @@ def covariance(value: ArrayLike) -> tuple[tuple[float, ...], ...]:
     """A covariance as tuples."""
     rule = "a symmetric positive definite matrix"
     try:
-        matrix = np.asarray(value, dtype=np.float64)
+        matrix = as_real("Gaussian.cov", value, rule)
         np.linalg.cholesky(matrix)
-    except (TypeError, ValueError, np.linalg.LinAlgError):
+    except (ValueError, np.linalg.LinAlgError):
         raise ScenarioError("Gaussian.cov", value, rule) from None
     if matrix.shape not in ((1, 1), (2, 2), (3, 3)) or not (np.isfinite(matrix).all() and (matrix == matrix.T).all()):
         raise ScenarioError("Gaussian.cov", value, rule)

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import as_real
 from tadcore.errors import ScenarioError
 
 from .base import Block, Parameters, covariance, listed, numbers, positive
@@ -229,16 +230,8 @@ class _Listed(Parameters):
     def __post_init__(self) -> None:
         name = f"{type(self).__name__}.values"
         rule = "a list of numbers (for a radius) or of positions, at least one"
-        try:
-            array = np.asarray(self.values, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ScenarioError(name, self.values, rule) from None
-        real = (
-            np.asarray(self.values).dtype.kind in "iuf"
-            and not np.ma.is_masked(self.values)
-            and not np.isnan(array).any()
-        )
-        if array.ndim not in (1, 2) or not array.size or not real:
+        array = as_real(name, self.values, rule)
+        if array.ndim not in (1, 2) or not array.size or np.isnan(array).any():
             raise ScenarioError(name, self.values, rule)
         self.keep("values", tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist()))
 

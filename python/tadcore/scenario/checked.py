@@ -6,20 +6,25 @@ once, at the outermost entry: the constructor, ``model_validate`` and its relati
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tadcore.errors import ScenarioError
 
-from .fields import scenario_error
+from .fields import path_of, scenario_error
 from .paths import AXES, normal
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
 else:
     ModelMetaclass = type(BaseModel)
+
+Model = TypeVar("Model")
+
+NO_FIELD = "the path of a field that exists, such as attacker.position or d1.position"
+_IMMUTABLE = "left as it is: scenarios are immutable, use replace"
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(Field,))
@@ -53,38 +58,49 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
     if not TYPE_CHECKING:  # a type checker knows that the fields are frozen
 
         def __setattr__(self, name: str, value: object) -> None:
-            try:
-                super().__setattr__(name, value)
-            except ValidationError as error:
-                raise _translate(type(self), error) from None
+            raise ScenarioError(path_of((name,), self._root), value, _IMMUTABLE)
+
+        def __delattr__(self, name: str) -> None:
+            raise ScenarioError(path_of((name,), self._root), "del", _IMMUTABLE)
+
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        """Take what a pickle holds, if it is valid: it may have been written by another version, or by hand."""
+        try:
+            super().__setstate__(state)
+        except (KeyError, TypeError, AttributeError):
+            raise ScenarioError(self._root or "scenario", state, "the state of a pickled one") from None
+        super().__setstate__(type(self).model_validate(self).__getstate__())
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
         """Validate a dict or an instance; raises `ScenarioError`."""
-        try:
-            return super().model_validate(obj, **options)
-        except ValidationError as error:
-            raise _translate(cls, error) from None
+        return _validated(cls, super().model_validate, obj, options)
 
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
         """Validate a JSON text; raises `ScenarioError`."""
-        try:
-            return super().model_validate_json(json_data, **options)
-        except ValidationError as error:
-            raise _translate(cls, error) from None
+        return _validated(cls, super().model_validate_json, json_data, options)
 
     @classmethod
     def model_validate_strings(cls, obj: Any, **options: Any) -> Self:
         """Validate a dict of strings; raises `ScenarioError`, since no string is taken for a number."""
-        try:
-            return super().model_validate_strings(obj, **options)
-        except ValidationError as error:
-            raise _translate(cls, error) from None
+        return _validated(cls, super().model_validate_strings, obj, options)
+
+    @classmethod
+    def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:  # type: ignore[override]
+        """A model from its fields, validated: there is no way around the rules."""
+        return cls(**values)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy, with ``update`` validated like everything else."""
-        return self.replace(update) if update else super().model_copy(deep=deep)
+        return super().model_copy(deep=deep) if update is None else self.replace(update)
+
+    def copy(self, *, include: Any = None, exclude: Any = None, update: Any = None, deep: bool = False) -> Self:
+        """The same as `model_copy`; a copy without some of the fields would be none."""
+        for name, value in (("include", include), ("exclude", exclude)):
+            if value is not None:
+                raise ScenarioError(name, value, "left out: a copy has every field; model_dump takes some of them")
+        return self.model_copy(update=update, deep=deep)
 
     def replace(self, updates: Mapping[str, Any] | None = None, /, **fields: Any) -> Self:
         """A new model with some fields changed, validated as a whole.
@@ -102,6 +118,8 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
         ScenarioError
             A path leads nowhere, or the result breaks a rule.
         """
+        if not isinstance(updates, Mapping | None):
+            raise ScenarioError("updates", updates, 'a dict of paths and values, such as {"d1.visibility_radius": 2.0}')
         changes = {**(updates or {}), **fields}
         data = self._plain(changes)
         taken: dict[str, str] = {}
@@ -110,7 +128,10 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
                 if name in taken:
                     raise ScenarioError(path, value, f'set once only: "{taken[name]}" sets it too')
                 taken[name] = path
-                _assign(data, name, path, value)
+                try:
+                    _assign(data, name, value)
+                except LookupError:
+                    raise ScenarioError(path, value, self._rule_of(path)) from None
         return type(self).model_validate(data)
 
     def _meant(self, path: Any, value: Any) -> Sequence[str]:
@@ -119,32 +140,43 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
             raise ScenarioError(str(path), value, "named by a path such as attacker.position or d1.position")
         return [normal(path)]
 
+    def _rule_of(self, path: str, rule: str = NO_FIELD) -> str:
+        """What a path that leads nowhere must be."""
+        return rule
+
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """The fields to start a replacement from."""
         return self.model_dump()
+
+
+def _validated(model: type[Any], validate: Callable[..., Model], given: Any, options: dict[str, Any]) -> Model:
+    """What pydantic makes of something, under the rules of the model whatever the options are."""
+    if options.get("extra") not in (None, "forbid"):
+        raise ScenarioError("extra", options["extra"], 'left out, or "forbid": what is no field is refused')
+    try:
+        return validate(given, **options)
+    except ValidationError as error:
+        raise _translate(model, error) from None
 
 
 def _translate(model: type[Any], error: ValidationError) -> ScenarioError:
     return scenario_error(error, model, model._root)
 
 
-_NO_FIELD = "the path of a field that exists, such as attacker.position or d1.position"
-
-
-def _assign(data: dict[str, Any], name: str, path: str, value: Any) -> None:
-    """Set the entry of a nested table that `name` means; tuples and models on the way are opened."""
+def _assign(data: dict[str, Any], name: str, value: Any) -> None:
+    """Set the entry of a nested table that `name` means, or raise LookupError; tuples and models are opened."""
     node: Any = data
     *way, last = name.split(".")
     for part in way:
-        key = _key(node, part, path, value)
+        key = _key(node, part)
         node[key] = node = _open(node[key])
     if isinstance(node, dict) and last.isidentifier():
         node[last] = value  # a field that does not exist is refused by the model, which knows the others
     else:
-        node[_key(node, last, path, value)] = value
+        node[_key(node, last)] = value
 
 
-def _key(node: Any, part: str, path: str, value: Any) -> str | int:
+def _key(node: Any, part: str) -> str | int:
     """The key of a part of a path in a table or a list."""
     if isinstance(node, dict) and part in node:
         return part
@@ -152,7 +184,7 @@ def _key(node: Any, part: str, path: str, value: Any) -> str | int:
         place = AXES.find(part) if part in ("x", "y", "z") else int(part) if part.isdecimal() and len(part) < 10 else -1
         if 0 <= place < len(node):
             return place
-    raise ScenarioError(path, value, _NO_FIELD)
+    raise LookupError(part)
 
 
 def _open(child: Any) -> Any:

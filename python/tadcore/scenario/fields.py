@@ -208,8 +208,6 @@ def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str, hint: bool)
         return [ScenarioError(field, detail["input"], str(detail["ctx"]["expected"]).replace("'", '"'))]
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return [ScenarioError(field, detail["input"], "a table of fields")]
-    if kind == "frozen_instance":
-        return [ScenarioError(field, detail["input"], "left as it is: scenarios are immutable, use replace")]
     if kind == "json_invalid":
         return [ScenarioError(field, detail["input"], f"valid JSON ({detail['ctx']['error']})")]
     rule = detail["msg"].removeprefix("Input should be ")

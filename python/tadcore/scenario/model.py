@@ -32,11 +32,12 @@ import tomli_w
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from tadcore._shared.arrays import Floats
-from tadcore._shared.files import parse_toml, read_text, write_whole
+from tadcore._shared.files import as_path, write_whole
 from tadcore._shared.limits import MOST_DEFENDERS, can_be_told, sees_whom_it_intercepts, too_far
+from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import ScenarioError
 
-from .checked import CheckedModel
+from .checked import NO_FIELD, CheckedModel
 from .fields import (
     Fraction,
     Gamma,
@@ -48,6 +49,7 @@ from .fields import (
     is_team,
     refusal,
 )
+from .hints import hint, wildcards
 from .paths import beyond, expand
 
 _MOST_STEPS = 10_000_000
@@ -258,7 +260,7 @@ class Scenario(CheckedModel):
         # Arrays here hold a few numbers: they read better on one line.
         text = _ARRAY.sub(lambda lines: f"[{' '.join(lines[1].split())[:-1]}]", tomli_w.dumps(self.model_dump()))
         if path is not None:
-            write_whole(path, text)
+            write_whole(as_path("path", path), text)
         return text
 
     def describe(self) -> str:
@@ -302,8 +304,13 @@ class Scenario(CheckedModel):
         if missing := beyond(self.n, path):
             raise ScenarioError(path, value, missing)
         if not names:
-            raise ScenarioError(path, value, "the path of a field that some player of this game has")
+            rule = "the path of a field that some player of this game has"
+            raise ScenarioError(path, value, self._rule_of(path, rule))
         return names
+
+    def _rule_of(self, path: str, rule: str = NO_FIELD) -> str:
+        nearest = hint(path, wildcards(self.paths))
+        return f"{rule}{nearest and f'; {nearest}'}"
 
     def _plain(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         data = self.model_dump()

@@ -20,9 +20,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 from tadcore.errors import ScenarioError
+
+Value = TypeVar("Value")
 
 AXES = "xyz"
 _EXAMPLES = "a path such as attacker.position or d1.visibility_radius"
@@ -52,6 +54,19 @@ def label(player: Any) -> Any:
     return short(player) if isinstance(player, str) else player
 
 
+class ByPath(dict[str, Value]):
+    """A dict whose keys are paths in normal form, and which finds them by any other spelling too."""
+
+    def __missing__(self, key: object) -> Value:
+        name = normal(key) if isinstance(key, str) else key
+        if name in self.keys():
+            return self[name]
+        raise KeyError(f"{short(key) if isinstance(key, str) else repr(key)}; there is {', '.join(map(short, self))}")
+
+    def __contains__(self, key: object) -> bool:
+        return super().__contains__(normal(key) if isinstance(key, str) else key)
+
+
 def is_owner(path: str) -> bool:
     """Whether a path is one of a player, or of several, without a field."""
     return _OWNER.fullmatch(normal(path)) is not None
@@ -68,7 +83,10 @@ def expand(path: Any, names: Iterable[str]) -> list[str]:
 def beyond(n: int, path: str) -> str:
     """What the path of a defender that is not among n must be; empty where the path is of no such defender."""
     numbered = re.match(r"(d|defenders\.)(\d+)(\.|$)", normal(path))
-    if numbered is None or (numbered[1] != "d" and len(numbered[2]) < 10 and int(numbered[2]) < n):
+    if numbered is None:
+        return ""
+    place = int(numbered[2][-10:]) - (numbered[1] == "d")
+    if len(numbered[2]) < 10 and 0 <= place < n:
         return ""
     return (
         f"the path of a defender of this game, which has {'1 defender, d1' if n == 1 else f'{n} defenders, d1 to d{n}'}"

@@ -12,6 +12,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
+from tadcore._shared.files import as_path
 from tadcore._shared.text import similar
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
@@ -61,7 +62,9 @@ def find(source: str, folder: Path | None = None, *, field: str = "") -> Scenari
     """
     from tadcore.scenario.model import Scenario
 
-    path = (folder or Path()) / source
+    if not isinstance(source, str):
+        raise ScenarioError(field or "source", source, "the path of a file, or the name of a bundled scenario")
+    path = (Path() if folder is None else as_path("folder", folder)) / source
     if "\0" not in source and not path.exists():
         if source in _NAMES:
             return load(source)
@@ -78,7 +81,7 @@ def find(source: str, folder: Path | None = None, *, field: str = "") -> Scenari
 
 def text(name: str) -> str:
     """The TOML file of a bundled scenario, comments included."""
-    if name not in _NAMES:
+    if not isinstance(name, str) or name not in _NAMES:
         hint = similar(name, _NAMES, most=2, cutoff=0.5) or f"the names are {', '.join(_NAMES)}"
         raise ScenarioError("scenario name", name, f"the name of a bundled scenario; {hint}")
     return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")

@@ -1,20 +1,35 @@
-"""A run as an xarray dataset and as files."""
+"""A run as an xarray dataset, in a few numbers, and as files."""
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import json
 import os
-from pathlib import Path
-from typing import Any, Protocol
+from collections.abc import Iterable
+from typing import Any, Protocol, get_origin, get_type_hints
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
-from tadcore._shared.files import write_whole
+from tadcore._shared.files import as_path, destination, write_whole
+from tadcore.errors import ScenarioError
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.synthesis import theta_terms
 from tadcore.scenario.provenance import provenance
+
+SUFFIX = ".nc"
+RECORD = "run"
+"""The attribute with all of a run that its dataset does not have."""
+
+SEAL = "sha256"
+"""Its entry with the digest of all else."""
+
+VARIABLES = {"times": "time", "gains": "gain"}
+"""Where a variable of the dataset is not called as the field of the run."""
 
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
 
@@ -103,6 +118,7 @@ def dataset_of(run: Written) -> xr.Dataset:
             "references": _PAPER,
             **variant_of(run),
             **provenance(sc),
+            **record_of(run),
         },
     )
 
@@ -149,11 +165,46 @@ def _arrows(edges: tuple[Edge, ...]) -> list[str]:
     return [f"{observer}->{seen}" for observer, seen in edges]
 
 
-def save(run: Written, folder: str | os.PathLike[str]) -> None:
-    """Write the dataset, the scenario and the summary into a folder, made where it is not there."""
-    place = Path(folder)
+def fields_of(kind: type[Any]) -> tuple[list[str], dict[str, TypeAdapter[Any]]]:
+    """The fields of a run that are arrays, and how each other one, the scenario apart, becomes JSON and comes back."""
+    hints = get_type_hints(kind)
+    names = [field.name for field in dataclasses.fields(kind) if field.name != "scenario"]
+    arrays = [name for name in names if get_origin(hints[name]) is np.ndarray]
+    return arrays, {name: TypeAdapter(hints[name]) for name in names if name not in arrays}
+
+
+def seal(scenario: str, record: dict[str, Any], arrays: Iterable[NDArray[Any]]) -> str:
+    """SHA-256 of a run: of its scenario, of what is no array, and of every number, array after array."""
+    total = hashlib.sha256(json.dumps([scenario, record], sort_keys=True).encode())
+    for array in arrays:
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()
+
+
+def record_of(run: Written) -> dict[str, str]:
+    """What the dataset does not say of a run, as an attribute."""
+    arrays, others = fields_of(type(run))
+    record = {name: adapter.dump_python(getattr(run, name)) for name, adapter in others.items()}
+    sealed = {SEAL: seal(run.scenario.to_toml(), record, (getattr(run, name) for name in arrays))}
+    return {RECORD: json.dumps(record | sealed)}
+
+
+def save(run: Written, path: str | os.PathLike[str]) -> None:
+    """Write a run as one file or into a folder; see `tadcore.Run.save`."""
+    place = as_path("path", path)
+    if place.suffix.lower() == SUFFIX:
+        destination(place)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(place, _netcdf(run))
+        return
+    if any(map(str.isalpha, place.suffix)) and not place.is_dir():
+        rule = f"a name that ends in {SUFFIX}, for one file, or has no suffix, for a folder"
+        raise ScenarioError("path", os.fspath(path), rule)
     place.mkdir(parents=True, exist_ok=True)
-    packed = run.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")
-    write_whole(place / "run.nc", bytes(packed))
+    write_whole(place / "run.nc", _netcdf(run))
     run.scenario.to_toml(place / "scenario.toml")
     write_whole(place / "summary.json", json.dumps(summary_of(run), indent=2, allow_nan=False) + "\n")
+
+
+def _netcdf(run: Written) -> bytes:
+    return bytes(run.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))

@@ -64,7 +64,7 @@ class Run:
     unconverged : int
         Instants at which the synthesis stopped short of its tolerance.
     certified : int
-        Rows of the record whose gains are proved to be globally optimal.
+        Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
         The rule by which edges form and break; zero in the paper's game. See `simulate`.
     """
@@ -160,11 +160,26 @@ class Run:
 
         return Animation(self, seconds=seconds, fps=fps, width=width)
 
-    def save(self, folder: str | os.PathLike[str]) -> None:
-        """Write ``run.nc`` (netCDF 3), ``scenario.toml`` and ``summary.json``, each whole or not at all."""
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run; `tadcore.load_run` reads it back.
+
+        Parameters
+        ----------
+        path : path
+            A name that ends in ``.nc``: one netCDF 3 file, which xarray opens. A name without a suffix, or a folder
+            that is there: ``run.nc``, ``scenario.toml`` and ``summary.json`` in that folder. Each file appears whole
+            or not at all; folders on the way are made.
+
+        Raises
+        ------
+        ScenarioError
+            The name ends in something else.
+        OSError
+            The place cannot be written.
+        """
         from .files import save
 
-        save(self, folder)
+        save(self, path)
 
     def __repr__(self) -> str:
         changes = max(len(self.network_changes) - 1, 0)

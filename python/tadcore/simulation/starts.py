@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_real
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component, setups
@@ -45,7 +45,7 @@ def rows_of(sc: Scenario, inputs: Mapping[str, ArrayLike], trials: int) -> Rows:
     """
     columns = np.empty((trials, len(inputs)))
     for column, (name, given) in enumerate(inputs.items()):
-        values = np.asarray(given, dtype=np.float64)
+        values = as_real(name, given, f"numbers, one for each of {trials} trials")
         if values.shape != (trials,):
             raise ScenarioError(name, f"shape {values.shape}", f"of shape ({trials},), one value for each trial")
         columns[:, column] = values

@@ -5,11 +5,12 @@ table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
 """
 
 from .comparison import Comparison, compare, difference_interval, paired
-from .incidence import Incidence, incidence
-from .intervals import OutcomeProbabilities, probabilities, proportion_interval
+from .incidence import Incidence, incidence, incidence_of
+from .intervals import OutcomeProbabilities, probabilities, probabilities_of, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
-from .radius import Breakpoints, RadiusCurve
+from .radius import Breakpoints, RadiusCurve, SmallestRadius
 from .sequences import HalfWidth, mixture_interval
+from .stopping import Stopping
 
 __all__ = [
     "Breakpoints",
@@ -18,14 +19,18 @@ __all__ = [
     "Incidence",
     "OutcomeProbabilities",
     "RadiusCurve",
+    "SmallestRadius",
+    "Stopping",
     "TrialOutcomes",
     "compare",
     "difference_interval",
     "incidence",
+    "incidence_of",
     "mixture_interval",
     "outcome_counts",
     "outcome_names",
     "paired",
     "probabilities",
+    "probabilities_of",
     "proportion_interval",
 ]

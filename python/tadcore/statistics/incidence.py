@@ -11,27 +11,35 @@ exact quantile at M trials is the half-width here. A law with atoms, as on a gri
 continuous one: its supremum runs over fewer places, so it is stochastically smaller and the bands are conservative
 (Kolmogorov 1933; Noether 1963). They hold at all t at once, for one outcome; with ``jointly`` for all outcomes at once,
 1 - level split evenly between them.
+
+Where a rule was asked when to stop, after chunks of trials, the bands have to hold at whichever look it stopped: the
+j-th look has the share 1 / (j (j + 1)) of 1 - level. These shares sum to 1, so the bands hold at all looks at once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore import _core
-from tadcore._shared.arrays import Floats, as_real, refuse_where
+from tadcore._shared.arrays import Floats, as_amount, as_index, as_real, refuse_where
+from tadcore._shared.shares import decimals, percent, share
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 
-from .outcomes import KINDS, as_level, as_outcomes, outcome_names
+from .outcomes import KINDS, TrialOutcomes, as_level, as_outcomes, outcome_names
+from .stopping import level_of, stopping_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _OFF_GRID = 1e-6  # steps
+_RAREST = 1e-5  # below this the quantiles of SciPy are too small: at 1e-16 the law exceeds them five times as often
+_MOST_ENTRIES = 2**28  # of a curve for every outcome: 2 GiB each of the estimate and of both ends of its band
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,6 +62,8 @@ class Incidence:
         Half the width of a band before it is cut to [0, 1].
     jointly : bool
         Whether the level holds for all outcomes at once.
+    rule : str
+        The rule that was asked when to stop; empty where the number of trials was fixed beforehand.
     """
 
     times: Floats
@@ -65,6 +75,7 @@ class Incidence:
     level: float
     half_width: float
     jointly: bool
+    rule: str = ""
 
     @property
     def running(self) -> Floats:
@@ -84,8 +95,11 @@ class Incidence:
         return pd.DataFrame(columns, index=pd.Index(self.times, name="time"))
 
     def __repr__(self) -> str:
-        ends = ", ".join(f"{name} {self.estimate[i, -1]:.4f}" for i, name in enumerate(self.names))
-        return f"Incidence({self.trials:,} trials up to t = {self.times[-1]:g}: {ends}; bands ± {self.half_width:.4f})"
+        places = decimals(0.0, 2.0 * self.half_width)
+        ends = ", ".join(f"{name} {share(self.estimate[i, -1], places)}" for i, name in enumerate(self.names))
+        by = f"; {self.rule}" if self.rule else ""
+        bands = f"{percent(self.level)} bands ± {share(self.half_width, places)}"
+        return f"Incidence({self.trials:,} trials up to t = {self.times[-1]:g}: {ends}; {bands}{by})"
 
 
 def incidence(
@@ -98,6 +112,7 @@ def incidence(
     n: int,
     level: float = 0.95,
     jointly: bool = False,
+    looks: int = 0,
 ) -> Incidence:
     """Estimate the cumulative incidence of each outcome.
 
@@ -115,6 +130,9 @@ def incidence(
         Confidence level of the bands.
     jointly : bool
         Whether the bands of all outcomes hold at once, or each by itself.
+    looks : int
+        How often a rule was asked whether to stop, the last time included; 0 where the number of trials was fixed
+        beforehand.
 
     Returns
     -------
@@ -133,11 +151,9 @@ def incidence(
     >>> found["intercepted"].round(3)
     array([0.   , 0.   , 0.667, 0.667, 0.667])
     """
-    from scipy.stats import kstwo
-
     codes, who = as_outcomes(kind, defender, n)
     confidence = as_level(level)
-    times = _grid(horizon, step)
+    times = _grid(as_amount("horizon", horizon), step, n)
     steps = len(times) - 1
     at = _instants(time, len(codes), horizon, steps)
     names = outcome_names(n)
@@ -146,8 +162,9 @@ def incidence(
     intercepted = codes == OutcomeKind.INTERCEPTED
     np.add.at(ended, (who[intercepted] + len(KINDS), at[intercepted]), 1)
     estimate = ended.cumsum(axis=1) / len(codes)
-    error = (1.0 - confidence) / (len(names) if jointly else 1)
-    half = float(kstwo.isf(error, len(codes)))
+    asked = as_index("looks", looks, 2**32)
+    error = (1.0 - confidence) / (len(names) if jointly else 1) / (asked * (asked + 1) if asked else 1)
+    half = _half_width(error, len(codes))
     return Incidence(
         times=times,
         names=names,
@@ -161,10 +178,60 @@ def incidence(
     )
 
 
-def _grid(horizon: float, step: float) -> Floats:
+def incidence_of(result: TrialOutcomes, *, level: float | None = None, jointly: bool = False) -> Incidence:
+    """Estimate the cumulative incidence of each outcome of a study, as its number of trials was decided.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The trials.
+    level : float, optional
+        Confidence level of the bands; 0.95, or that of the rule that was asked when to stop.
+    jointly : bool
+        Whether the bands of all outcomes hold at once, or each by itself.
+
+    Returns
+    -------
+    Incidence
+        Curves on the grid, one for each outcome.
+
+    Raises
+    ------
+    ScenarioError
+        There is no trial, or an option breaks a rule.
+    """
+    sc, stopping = result.scenario, stopping_of(result)
+    found = incidence(
+        result.kind,
+        result.defender,
+        result.time,
+        horizon=sc.horizon,
+        step=sc.step,
+        n=sc.n,
+        level=level_of(stopping, level),
+        jointly=jointly,
+        looks=0 if stopping is None else stopping.looks(result.trials),
+    )
+    return found if stopping is None else replace(found, rule=str(stopping))
+
+
+def _half_width(error: float, trials: int) -> float:
+    """The quantile of Kolmogorov's law at M trials; where SciPy has none so far out, Massart's bound on it."""
+    from scipy.stats import kstwo
+
+    if error < _RAREST:
+        return min(math.sqrt(math.log(2.0 / error) / (2.0 * trials)), 1.0)
+    return float(kstwo.isf(error, trials))
+
+
+def _grid(horizon: float, step: float, n: int) -> Floats:
     """The instants of the game itself; T over the whole number of steps, as δ may differ from it in the last digits."""
-    if not (step > 0.0 and horizon > 0.0 and np.isfinite(horizon / step)):
+    number = isinstance(step, int | float | np.integer | np.floating) and not isinstance(step, bool)
+    if not (number and step > 0.0 and horizon > 0.0 and np.isfinite(horizon / step)):
         raise ScenarioError("step", step, f"a positive divisor of the horizon ({horizon!r})")
+    most = _MOST_ENTRIES // (len(KINDS) + n)
+    if horizon / step > most:
+        raise ScenarioError("step", step, f"large enough for at most {most:,} instants up to {horizon!r}")
     return _core.grid_times(horizon, step)
 
 

@@ -19,6 +19,9 @@ from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
 
+MOST_TRIALS = 2**40
+"""Counts up to here are whole in double precision, and so are the differences of their logarithms."""
+
 KINDS = tuple(kind.name.lower() for kind in OutcomeKind)
 """Names of the three kinds, at the place of their codes."""
 
@@ -131,8 +134,18 @@ def as_level(level: Any) -> float:
     raise ScenarioError("level", level, "a confidence level in (0, 1), such as 0.95")
 
 
-def _integers(field: str, values: ArrayLike) -> Integers:
-    array = np.asarray(values)
+def as_counts(field: str, values: ArrayLike) -> Integers:
+    """An array of whole numbers; bools, floats and ragged lists are refused."""
+    array = _integers(field, values, "whole numbers")
+    refuse_where(field, array, array > MOST_TRIALS, f"at most {MOST_TRIALS}")
+    return array
+
+
+def _integers(field: str, values: ArrayLike, rule: str = "an array of integers") -> Integers:
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise ScenarioError(field, values, rule) from error
     if array.dtype.kind not in "iu" and array.size:
-        raise ScenarioError(field, values, "an array of integers")
+        raise ScenarioError(field, values, rule)
     return array.astype(np.int64)

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, Integers
+from tadcore._shared.shares import estimate, percent, share
+from tadcore.errors import ScenarioError
 
 from .comparison import difference_interval
 
@@ -51,6 +53,43 @@ class Breakpoints:
         return f"Breakpoints({len(self):,} in {len(np.unique(self.trial)):,} trials)"
 
 
+@dataclass(frozen=True, repr=False)
+class SmallestRadius:
+    """The smallest radius at which an outcome is probable enough with confidence, or that there is none.
+
+    Attributes
+    ----------
+    outcome : str
+        The event.
+    at_least : float
+        What its probability was to reach.
+    radius : float or None
+        The smallest of the radii played whose band begins at ``at_least`` or above; None where none does.
+    best : float
+        The radius where the event came most often.
+    estimate, low, high : float
+        P(outcome) at ``radius``, or at ``best`` where there is none, with the band that holds at all radii at once.
+    level : float
+        Confidence level of the band.
+    """
+
+    outcome: str
+    at_least: float
+    radius: float | None
+    best: float
+    estimate: float
+    low: float
+    high: float
+    level: float
+
+    def __repr__(self) -> str:
+        shown = " ".join(estimate(self.estimate, self.low, self.high))
+        found = f"P({self.outcome}) = {shown}, {percent(self.level)} at all radii at once"
+        if self.radius is None:
+            return f"none reaches {share(self.at_least, 2)}; the best is {self.best:g}: {found}"
+        return f"{self.radius:g}: {found}"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RadiusCurve:
     """Outcome probabilities against one radius; made by `radius_curve`.
@@ -66,21 +105,25 @@ class RadiusCurve:
     names : tuple of str
         ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
     estimate, low, high : ndarray, shape (3 + n, R)
-        Probabilities with pointwise intervals.
+        Probabilities with pointwise intervals: Wilson's, or a confidence sequence's where a rule was asked when to
+        stop.
     band_low, band_high : ndarray, shape (3 + n, R)
-        The band that holds at all radii at once.
+        The band of one outcome that holds at all R radii at once: Clopper and Pearson's intervals, or the confidence
+        sequence's, each with 1 / R of 1 - level.
     reference : float
         The radius that differences are taken against; the scenario's own unless another was given.
     difference, difference_low, difference_high : ndarray, shape (3 + n, R)
-        P(r) - P(reference), paired.
+        P(r) - P(reference), paired, each interval by itself.
     slope, slope_low, slope_high : ndarray, shape (3 + n, R - 1)
-        The gain per unit of radius between neighbouring radii, paired.
+        The gain per unit of radius between neighbouring radii, paired, each interval by itself; 0 up to inf.
     kind, defender : ndarray of int8 and int32, shape (R, M)
         Every outcome, as in `tadcore.Batch`.
     level : float
         Confidence level.
     breakpoints : Breakpoints or None
         The radii at which single trials change, where asked for.
+    rule : str
+        The rule that was asked when to stop the study; empty where the number of trials was fixed beforehand.
     """
 
     player: str
@@ -103,11 +146,54 @@ class RadiusCurve:
     defender: NDArray[np.int32]
     level: float
     breakpoints: Breakpoints | None
+    rule: str = ""
 
     @property
     def trials(self) -> int:
         """M."""
         return int(self.kind.shape[1])
+
+    def smallest(self, at_least: float, outcome: str = "intercepted") -> SmallestRadius:
+        """The smallest of the radii played at which an outcome has at least this probability, at the band's level.
+
+        That is: the lower end of the band, which holds at all radii at once, reaches it. P need not grow with a radius,
+        so a larger radius may fall short again; and a smaller one, between those played, may do.
+
+        Parameters
+        ----------
+        at_least : float
+            A probability in (0, 1).
+        outcome : str
+            One of `names`.
+
+        Returns
+        -------
+        SmallestRadius
+            The radius, or that none of them does and which is the best.
+
+        Raises
+        ------
+        ScenarioError
+            No such probability or outcome.
+        """
+        if not (isinstance(at_least, int | float | np.floating) and 0.0 < at_least < 1.0):
+            raise ScenarioError("at_least", at_least, "a probability in (0, 1)")
+        if outcome not in self.names:
+            raise ScenarioError("outcome", outcome, f"one of {', '.join(self.names)}")
+        row = self.names.index(outcome)
+        reached = np.flatnonzero(self.band_low[row] >= at_least)
+        best = int(self.estimate[row].argmax())
+        r = int(reached[0]) if reached.size else best
+        return SmallestRadius(
+            outcome=outcome,
+            at_least=float(at_least),
+            radius=float(self.radii[r]) if reached.size else None,
+            best=float(self.radii[best]),
+            estimate=float(self.estimate[row, r]),
+            low=float(self.band_low[row, r]),
+            high=float(self.band_high[row, r]),
+            level=self.level,
+        )
 
     def to_xarray(self) -> xarray.Dataset:
         """The curves over (outcome, radius), the slopes over (outcome, interval)."""
@@ -130,20 +216,28 @@ class RadiusCurve:
                 "reference": self.reference,
                 "trials": self.trials,
                 "level": self.level,
+                **({"rule": self.rule} if self.rule else {}),
             },
         )
 
     def __repr__(self) -> str:
         i = self.names.index("intercepted")
-        low, high = self.estimate[i].min(), self.estimate[i].max()
+        ends = [int(np.argmin(self.estimate[i])), int(np.argmax(self.estimate[i]))]
+        least, most = (" ".join(estimate(self.estimate[i, r], self.low[i, r], self.high[i, r])) for r in ends)
+        by = f"; {self.rule}" if self.rule else ""
         return (
             f"RadiusCurve({self.radius} of {self.player} at {len(self.radii)} radii in [{self.radii[0]:g}, "
-            f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {low:.4f} to {high:.4f})"
+            f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {least} to {most}, "
+            f"{percent(self.level)}{by})"
         )
 
 
-def paired_differences(pairs: list[tuple[Integers, Integers]], trials: int, level: float) -> Floats:
+def paired_differences(
+    pairs: list[tuple[Integers, Integers]], trials: int, level: float, method: Literal["score", "sequence"]
+) -> Floats:
     """Difference, low and high, shape (3, outcomes, R), from what is discordant at each of R radii."""
     counts = np.array(pairs)  # (R, 2, outcomes)
     first, second = counts[:, 0].T, counts[:, 1].T
-    return np.array([(first - second) / trials, *difference_interval(first, second, trials, level=level)])
+    return np.array(
+        [(first - second) / trials, *difference_interval(first, second, trials, level=level, method=method)]
+    )

@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +34,7 @@ from numpy.typing import ArrayLike
 from tadcore._shared.arrays import as_index
 from tadcore.errors import ScenarioError
 
-from .outcomes import KINDS, as_level, outcome_names
+from .outcomes import KINDS, MOST_TRIALS, as_level, outcome_names
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class HalfWidth:
         ScenarioError
             No outcome is counted, or a count is not in [0, trials].
         """
-        total = as_index("trials", trials, 2**53)
+        total = as_index("trials", trials, MOST_TRIALS)
         named = _named(counts)
         error = (1.0 - self.level) / len(named)
         return {
@@ -130,29 +131,61 @@ def mixture_interval(successes: int, trials: int, error: float) -> tuple[float, 
     successes, trials : int
         s and t, 0 ≤ s ≤ t.
     error : float
-        α, the probability with which the sequence of intervals may ever miss the truth.
+        α, the probability with which the sequence of intervals may ever miss the truth, in (0, 1].
 
     Returns
     -------
     low, high : float
         Ends of the interval.
+
+    Raises
+    ------
+    ScenarioError
+        A number is out of its range.
     """
-    failures = trials - successes
-    return _lower_end(successes, failures, error), 1.0 - _lower_end(failures, successes, error)
+    total = as_index("trials", trials, MOST_TRIALS)
+    s = as_index("successes", successes, total)
+    alpha = as_error(error)
+    return _lower_end(s, total - s, alpha), 1.0 - _lower_end(total - s, s, alpha)
+
+
+def as_error(error: Any) -> float:
+    """A probability of error: a number in (0, 1]."""
+    number = isinstance(error, int | float | np.floating) and not isinstance(error, bool)
+    if not number or not 0.0 < float(error) <= 1.0:
+        raise ScenarioError("error", error, "a probability in (0, 1]")
+    return float(error)
+
+
+def log_stirling(count: int) -> float:
+    """Logarithm of count! e^count / count^count, accurate for large counts."""
+    if count < 1_000:
+        return math.lgamma(count + 1.0) - count * math.log(max(count, 1)) + count
+    return math.log(2.0 * math.pi * count) / 2.0 + 1.0 / (12.0 * count) - 1.0 / (360.0 * count**3)
 
 
 def _lower_end(successes: int, failures: int, error: float) -> float:
     from scipy.optimize import brentq
-    from scipy.special import betaln, xlog1py, xlogy
 
     if successes == 0:
         return 0.0
-    evidence = float(betaln(successes + 1, failures + 1)) + math.log(error)
+    trials = successes + failures
+    top, rest = successes / trials, failures / trials
+    # logarithm of α M_t at s/t; differences from it are computed as such, since each likelihood is tiny
+    peak = log_stirling(successes) + log_stirling(failures) - log_stirling(trials) - math.log1p(trials)
+    peak += math.log(error)
 
     def excess(p: float) -> float:
         """Logarithm of α M_t(p): negative inside the interval, decreasing up to s / t."""
-        return evidence - float(xlogy(successes, p) + xlog1py(failures, -p))
+        lost = failures * math.log1p((top - p) / rest) if failures else 0.0
+        won = math.log(p / top) if 2.0 * p < top else math.log1p((p - top) / top)
+        return peak - successes * won - lost
 
-    outside = math.exp(evidence / successes) * (1.0 - 1e-9)  # there p^s alone makes M_t reach 1/α
-    found: float = brentq(excess, outside, successes / (successes + failures), xtol=1e-15, rtol=1e-13)
+    if not excess(top) < 0.0:  # a level so low that nothing but the estimate is left
+        return top
+    alone = failures * (math.log1p(-top) if top < 0.5 else math.log(rest)) if failures else 0.0
+    outside = top * math.exp((peak + alone) / successes) * (1.0 - 1e-9)  # there p^s alone makes M_t reach 1/α
+    if outside == 0.0:  # smaller than any double
+        return 0.0
+    found: float = brentq(excess, outside, top, xtol=1e-300, rtol=1e-13, maxiter=2_000)
     return found

@@ -7,9 +7,10 @@ that input i explains by itself; the *total* index
 total index of zero could be fixed anywhere (Sobol' 2001). Here Y is an outcome, as 0 or 1, or the termination time.
 
 Two matrices A and B of n points each and the d matrices A with one column from B, n (d + 2) games in all, give both
-indices of every input (Saltelli et al. 2010, as computed by `scipy.stats.sobol_indices`). The points are a scrambled
-Sobol' sequence. Intervals are percentiles of a bootstrap over the n rows; since a Sobol' sequence is more even than
-independent points, they are on the wide side. An estimate of a small index may be a little below 0.
+indices of every input (Saltelli et al. 2010; `scipy.stats.sobol_indices` has the same estimators). The points are a
+scrambled Sobol' sequence. Intervals are percentiles of a bootstrap over the n rows, each by itself: an approximation,
+which no theorem bounds. A Sobol' sequence is more even than independent points, which makes them wide; an outcome
+that only a few of the points differ in makes them unreliable. An estimate of a small index may be a little below 0.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.arrays import Floats, as_index, refuse_where
+from tadcore._shared.shares import estimate as interval, percent
 from tadcore._shared.text import as_text
-from tadcore.errors import ScenarioError
+from tadcore.errors import ScenarioError, TadcoreError
 
 from .outcomes import as_level
 
@@ -49,7 +50,7 @@ class Sensitivity:
     outputs : tuple of str
         Names of the s quantities.
     first, first_low, first_high : ndarray, shape (s, d)
-        First-order indices with their intervals; NaN for a quantity that never varied.
+        First-order indices with their intervals; NaN for a quantity that is the same at all points of A and B.
     total, total_low, total_high : ndarray, shape (s, d)
         Total indices with theirs.
     mean, variance : ndarray, shape (s,)
@@ -57,7 +58,7 @@ class Sensitivity:
     points : int
         n, the points in each of the two matrices.
     level : float
-        Confidence level of each interval.
+        Nominal level of each interval by itself.
     """
 
     inputs: tuple[str, ...]
@@ -90,16 +91,14 @@ class Sensitivity:
         rows = [
             [
                 f"{output} ← {name}",
-                f"{self.first[o, i]:.3f}",
-                f"[{self.first_low[o, i]:.3f}, {self.first_high[o, i]:.3f}]",
-                f"{self.total[o, i]:.3f}",
-                f"[{self.total_low[o, i]:.3f}, {self.total_high[o, i]:.3f}]",
+                *interval(self.first[o, i], self.first_low[o, i], self.first_high[o, i], least=3),
+                *interval(self.total[o, i], self.total_low[o, i], self.total_high[o, i], least=3),
             ]
             for o, output in enumerate(self.outputs)
             for i, name in enumerate(self.inputs)
         ]
-        share = f"{100 * self.level:g} %"
-        return as_text(f"{self.evaluations:,} evaluations", ["output ← input", "first", share, "total", share], rows)
+        level = f"{percent(self.level)} (bootstrap)"
+        return as_text(f"{self.evaluations:,} evaluations", ["output ← input", "first", level, "total", level], rows)
 
 
 def sobol(
@@ -129,7 +128,8 @@ def sobol(
     level : float
         Confidence level of each interval.
     resamples : int
-        Bootstrap resamples.
+        Bootstrap resamples. With fewer than 2 / (1 - level) - 1 there are no such percentiles, and every interval is
+        [0, 1].
 
     Returns
     -------
@@ -139,7 +139,7 @@ def sobol(
     Raises
     ------
     ScenarioError
-        An option breaks a rule, or a distribution has no ``ppf``.
+        An option breaks a rule, a distribution has no ``ppf`` or gives NaN, or the function's values are not finite.
     """
     from scipy.stats import qmc
 
@@ -147,7 +147,7 @@ def sobol(
     n = as_index("points", points, 2**30, least=2)
     if n & (n - 1):
         raise ScenarioError("points", points, "a power of 2")
-    as_index("resamples", resamples, 1_000_000, least=1)
+    again = as_index("resamples", resamples, 1_000_000, least=1)
     d, s = len(inputs), len(outputs)
     if not d or not s:
         raise ScenarioError("inputs" if s else "outputs", "nothing", "at least one name")
@@ -156,18 +156,15 @@ def sobol(
             raise ScenarioError(f"inputs[{name!r}]", distribution, "a distribution with a ppf, as scipy.stats has them")
     rng = np.random.Generator(np.random.Philox(as_index("seed", seed, 2**128 - 1)))
     unit = qmc.Sobol(2 * d, scramble=True, rng=rng).random(n).T
-    values = np.array([p.ppf(unit[[i, d + i]]) for i, p in enumerate(inputs.values())], dtype=np.float64)
+    values = np.array([_drawn(name, p, unit[[i, d + i]]) for i, (name, p) in enumerate(inputs.items())])
     a, b = values[:, 0], values[:, 1]
     mixed = np.repeat(a[np.newaxis], d, axis=0)  # (d, d, n): the i-th matrix has its row i from B
     mixed[np.arange(d), np.arange(d)] = b
     everything = np.concatenate([a, b, *mixed], axis=1)
-    f = np.asarray(function(everything), dtype=np.float64).reshape(s, d + 2, n)
-    varies = np.ptp(f, axis=(1, 2)) > 0.0
-    estimate = _indices(f, varies)
-    resampled = np.array([_indices(f[..., rng.integers(0, n, n)], varies) for _ in range(resamples)])
-    tail = (1.0 - confidence) / 2.0
-    low, high = np.full((2, *estimate.shape), np.nan)
-    low[:, varies], high[:, varies] = np.nanquantile(resampled[:, :, varies], [tail, 1.0 - tail], axis=0)
+    f = _evaluated(function, everything, tuple(outputs)).reshape(s, d + 2, n)
+    estimate = _indices(f)
+    resampled = np.array([_indices(f[..., rng.integers(0, n, n)]) for _ in range(again)])
+    low, high = _percentiles(resampled, (1.0 - confidence) / 2.0, estimate)
     return Sensitivity(
         inputs=tuple(inputs),
         outputs=tuple(outputs),
@@ -184,15 +181,57 @@ def sobol(
     )
 
 
-def _indices(f: Floats, varies: NDArray[np.bool_]) -> Floats:
-    """First-order and total indices, shape (2, s, d); NaN where a quantity does not vary."""
-    from scipy.stats import sobol_indices
+def _drawn(name: str, distribution: Distribution, unit: Floats) -> Floats:
+    """The values of one input, all of them numbers."""
+    rule = "a distribution whose ppf gives a number for each entry of an array"
+    try:
+        values = np.asarray(distribution.ppf(unit), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ScenarioError(f"inputs[{name!r}]", distribution, rule) from error
+    if values.shape != unit.shape or np.isnan(values).any():
+        raise ScenarioError(f"inputs[{name!r}]", distribution, rule)
+    return values
 
-    found = np.full((2, len(f), f.shape[1] - 2), np.nan)
-    good = varies & (np.ptp(f[:, :2], axis=(1, 2)) > 0.0)  # a resample may miss the few points that differ
-    if good.any():
-        parts = {"f_A": f[good, 0], "f_B": f[good, 1], "f_AB": np.moveaxis(f[good, 2:], 1, 0)}
-        indices = sobol_indices(func=parts, n=f.shape[-1])
-        shape = (int(good.sum()), f.shape[1] - 2)
-        found[0, good], found[1, good] = indices.first_order.reshape(shape), indices.total_order.reshape(shape)
+
+def _evaluated(function: Callable[[Floats], Floats], points: Floats, outputs: tuple[str, ...]) -> Floats:
+    """The quantities at all points, all of them finite."""
+    wanted = (len(outputs), points.shape[1])
+    try:
+        found = np.asarray(function(points), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, TadcoreError):
+            raise
+        raise ScenarioError("function", type(error).__name__, f"one that returns numbers of shape {wanted}") from error
+    if found.shape != wanted:
+        raise ScenarioError("function", f"shape {found.shape}", f"one that returns an array of shape {wanted}")
+    for name, row in zip(outputs, found, strict=True):
+        refuse_where(f"function: {name}", row, ~np.isfinite(row), "a finite number")
     return found
+
+
+def _indices(f: Floats) -> Floats:
+    """First-order and total indices, shape (2, s, d), by Saltelli et al. (2010), table 2 (b) and (f).
+
+    NaN where a quantity does not vary in A and B, such as in a resample that misses the few points which differ.
+    """
+    f = f - f[:, :2].mean(axis=(1, 2), keepdims=True)
+    a, b, mixed = f[:, :1], f[:, 1:2], f[:, 2:]
+    variance = np.where(np.ptp(f[:, :2], axis=(1, 2)) > 0.0, f[:, :2].var(axis=(1, 2)), np.nan)[:, np.newaxis]
+    variance = np.where(variance > 0.0, variance, np.nan)  # squares of tiny differences may vanish
+    return np.array([(b * (mixed - a)).mean(axis=2), 0.5 * ((a - mixed) ** 2).mean(axis=2)]) / variance
+
+
+def _percentiles(resampled: Floats, tail: float, estimate: Floats) -> tuple[Floats, Floats]:
+    """Ends of percentile intervals: the order statistics beyond which lies a share ``tail`` of the resamples.
+
+    All that is known of an index is that it is in [0, 1] where there are too few resamples for such a share, and in a
+    resample in which the quantity did not vary.
+    """
+    least, most = np.minimum(estimate, 0.0), np.maximum(estimate, 1.0)
+    rank = int((len(resampled) + 1) * tail * (1.0 + 1e-12))
+    if rank < 1:
+        return least, most
+    missing = np.isnan(resampled)
+    low = np.sort(np.where(missing, -np.inf, resampled), axis=0)[rank - 1]
+    high = np.sort(np.where(missing, np.inf, resampled), axis=0)[-rank]
+    return np.where(np.isinf(low), least, low), np.where(np.isinf(high), most, high)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tadcore.errors import WorkerError
 from tadcore.game.outcome import OutcomeKind
 from tadcore.sampling.design import CHUNK
+from tadcore.statistics.stopping import Stopping, kept, stopping_by
 
 from .plan import Plan
 from .progress import Progress
@@ -56,6 +57,11 @@ class Collection:
         self._stopped: int | None = None
         self._looked = 0
         self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
+
+    @property
+    def stopping(self) -> Stopping | None:
+        """The rule that is asked, and whether it has held."""
+        return None if self._until is None else stopping_by(self._until, held=self._stopped is not None, chunk=CHUNK)
 
     def gather(self, executor: Executor | None, threads: int | None) -> pa.Table:
         """The chunks in one table; what is not in the store is computed."""
@@ -100,7 +106,8 @@ class Collection:
 
     def _tell_store(self) -> None:
         if self._store is not None:
-            self._store.stop(self._stopped)
+            stopping = self.stopping
+            self._store.stop(self._stopped, None if stopping is None else kept(stopping))
 
 
 def _counts(table: pa.Table) -> NDArray[np.int64]:

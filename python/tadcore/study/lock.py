@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from filelock import FileLock, SoftFileLock, Timeout
 
-from tadcore._shared.files import PARTIAL
+from tadcore._shared.files import PARTIAL, strange
 from tadcore.errors import StoreError
 
 LOCK = "_store.lock"
@@ -49,7 +49,10 @@ def alone(folder: Path) -> Iterator[None]:
     path = folder / LOCK
     if path.is_symlink():
         raise StoreError(str(path), "it is a link, and a store writes nothing outside its folder", "remove the link")
-    native, us = _probed(folder)
+    found = strange(path) if path.exists() else None
+    if found is not None:
+        raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
+    native = _has_locks(path)
     lock = FileLock(path, timeout=0) if native else SoftFileLock(path, timeout=0)
     if not native:
         _tidy(path)
@@ -60,30 +63,32 @@ def alone(folder: Path) -> Iterator[None]:
     try:
         # A lock of the system writes no owner: this one is a lock file, perhaps of a machine that has no other lock.
         owner = _owner(path) if native else None
-        if owner is not None and not _dead(owner, us):
+        if owner is not None and not _dead(owner, folder):
             raise _taken(path)
         yield
     finally:
         lock.release()
 
 
-def _probed(folder: Path) -> tuple[bool, Owner | None]:
-    """Whether the file system has locks of the operating system, and who we are in a lock file."""
-    probe = folder / f"{PARTIAL}{secrets.token_hex(8)}.lock"
-    with SoftFileLock(probe, timeout=0):
-        us = _owner(probe)
+def _has_locks(path: Path) -> bool:
+    """Whether the file system has locks of the operating system; a lock file made to find out does not stay."""
+    try:
+        import fcntl
+    except ImportError:
+        return True  # Windows, whose locks are always there
+    made = not path.exists()
+    with path.open("ab") as stream:
         try:
-            import fcntl
-        except ImportError:
-            return True, us  # Windows, whose locks are always there
-        with probe.open("rb") as stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                if error.errno not in _UNSUPPORTED:
-                    raise
-                return False, us
-            return True, us
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError as error:
+            if error.errno not in _UNSUPPORTED:
+                raise
+            if made:
+                path.unlink(missing_ok=True)
+            return False
+        return True
 
 
 def _owner(path: Path) -> Owner | None:
@@ -94,8 +99,11 @@ def _owner(path: Path) -> Owner | None:
     return None if match is None else Owner(int(match["pid"]), match["host"])
 
 
-def _dead(owner: Owner, us: Owner | None) -> bool:
+def _dead(owner: Owner, folder: Path) -> bool:
     """Whether the owner of a lock file was a process of this machine, or container, and is no more."""
+    probe = folder / f"{PARTIAL}{secrets.token_hex(8)}.lock"
+    with SoftFileLock(probe, timeout=0):
+        us = _owner(probe)  # how a lock file calls this machine
     if us is None or owner.host != us.host or os.name != "posix":
         return False
     try:

@@ -51,6 +51,8 @@ class Manifest:
         The length of the longest study that was asked for.
     stopped : int or None
         The trials after which a stopping rule held.
+    rule : dict or None
+        The rule that was asked, whether it held or not: how it prints, and its level.
     columns : tuple of str
         Names of the inputs.
     version, created : str
@@ -66,6 +68,7 @@ class Manifest:
     trials: int
     columns: tuple[str, ...]
     stopped: int | None = None
+    rule: dict[str, Any] | None = None
     chunk: int = CHUNK
     stream: int = STREAM
     version: str = _core.__version__
@@ -97,14 +100,16 @@ class Manifest:
             "vary": as_plain(self.vary),
             "scenario": self.scenario,
         }
+        if self.rule is not None:
+            content["rule"] = self.rule
         return json.dumps(content | {SEAL: seal(content)}, indent=2, ensure_ascii=False) + "\n"
 
     @classmethod
     def read(cls, folder: str | os.PathLike[str]) -> Manifest:
         """The manifest of a store; raises `StoreError` where there is none that can be read."""
         path = Path(folder) / MANIFEST
-        refuse_old(Path(folder))
         try:
+            refuse_old(Path(folder))
             found = strange(path)
             if found is not None:
                 raise StoreError(str(path), f"it is {found}, not a file", "name the folder of a study")
@@ -137,6 +142,7 @@ class Manifest:
                 trials=_whole(content, "trials"),
                 columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
                 stopped=None if content["stopped"] is None else _whole(content, "stopped"),
+                rule=_entry(content, "rule", dict) if "rule" in content else None,
                 chunk=_whole(content, "chunk"),
                 stream=_whole(content, "stream"),
                 version=_entry(content, "tadcore_version", str),

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.shares import share
 from tadcore.game.outcome import OutcomeKind
 
 _FORMAT = "{desc}|{bar}| {n_fmt}/{total_fmt} [{remaining}, {rate_fmt}{postfix}]"
@@ -47,7 +48,7 @@ class Progress:
         order = (OutcomeKind.INTERCEPTED, OutcomeKind.CAPTURED, OutcomeKind.TIMEOUT)
         # "P(kind)" without its letters: the line has to fit into 80 columns, rate and all.
         self._bar.set_postfix_str(
-            " ".join(f"{kind.name.lower()} {estimates[kind]:.3f}" for kind in order), refresh=stored
+            " ".join(f"{kind.name.lower()} {share(float(estimates[kind]), 3)}" for kind in order), refresh=stored
         )
         if not stored:
             self._bar.update(rows)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pyarrow as pa
@@ -102,10 +102,10 @@ class Store:
         _write(self._part(chunk), encoded(table, {f"tadcore_{key}": value for key, value in said.items()}))
         self.rows[chunk] = rows
 
-    def stop(self, trials: int | None) -> None:
-        """Note after how many trials a stopping rule held."""
-        if trials != self.manifest.stopped:
-            self.manifest = replace(self.manifest, stopped=trials)
+    def stop(self, trials: int | None, rule: dict[str, Any] | None) -> None:
+        """Note which rule is asked, and after how many trials it held."""
+        if (trials, rule) != (self.manifest.stopped, self.manifest.rule):
+            self.manifest = replace(self.manifest, stopped=trials, rule=rule)
             _write(self.folder / MANIFEST, self.manifest.to_json())
 
     def _part(self, chunk: int) -> Path:

@@ -25,6 +25,7 @@ import contextlib
 import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -33,8 +34,8 @@ import pyarrow as pa
 
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.files import as_path
-from tadcore.errors import ScenarioError
-from tadcore.game.compiled import game_of
+from tadcore.errors import ScenarioError, StoreError
+from tadcore.game.compiled import as_scenario, game_of
 from tadcore.sampling.adapters import as_sampler, from_table
 from tadcore.sampling.base import Sampler
 from tadcore.sampling.design import DESIGNS, Design
@@ -42,9 +43,10 @@ from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.run import Run, simulate
+from tadcore.statistics.stopping import Stopping, from_kept
 
 from .collect import Collection, StoppingRule, jobs_of
-from .manifest import Manifest
+from .manifest import MANIFEST, Manifest
 from .plan import Plan
 from .progress import Progress
 from .store import Store
@@ -109,10 +111,11 @@ class Study:
     ) -> None:
         if not isinstance(sc, Scenario):
             raise ScenarioError("sc", sc, "a tadcore.Scenario")
+        as_scenario(sc)
         if not isinstance(vary, Mapping) or not vary:
             example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
             raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
-        if design not in DESIGNS:
+        if not isinstance(design, str) or design not in DESIGNS:
             raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
         self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
         samplers: dict[str, Sampler] = {}
@@ -169,6 +172,21 @@ class Study:
         drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
         return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
 
+    def check(self, *, progress: bool = False) -> None:
+        """Draw every trial without playing, as `run` does before anything else; a million take 0.1 s.
+
+        Parameters
+        ----------
+        progress : bool
+            Show a bar in a terminal or a notebook.
+
+        Raises
+        ------
+        ScenarioError
+            A draw is no game: the path, the trial and the value are named.
+        """
+        self._plan.check_ahead(self.trials, progress=progress)
+
     def replace(self, **changes: Any) -> Study:
         """Another study with some of ``sc``, ``vary``, ``trials``, ``seed`` and ``design`` changed."""
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
@@ -180,6 +198,16 @@ class Study:
         from .toml import read_study
 
         return cls(**read_study(path))
+
+    @classmethod
+    def from_toml_string(cls, text: str, *, name: str = "study", folder: str | os.PathLike[str] = ".") -> Study:
+        """Read a study from a TOML text.
+
+        Errors of syntax are reported under ``name``; the file of a scenario is looked for in ``folder``.
+        """
+        from .toml import parse_study
+
+        return cls(**parse_study(text, name, as_path("folder", folder)))
 
     def run(
         self,
@@ -206,7 +234,8 @@ class Study:
             Who computes the chunks: a process pool, Dask's ``client.get_executor()``, ``MPIPoolExecutor``. By default
             this process does, one chunk after another.
         until : StoppingRule, optional
-            Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds.
+            Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds. Statistics of
+            the result then use confidence sequences, which hold whatever the rule looked at.
         table : path, optional
             A file that keeps the game's table of transitions from study to study: read before, written after. With it
             a study of the same game reuses the saved gain table; the outcomes are the same. Not used by the workers
@@ -242,12 +271,13 @@ class Study:
             raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
         folder = None if store is None else as_path("store", store)
         kept_table = None if table is None else as_path("table", table)
-        self._plan.check_ahead(self.trials, progress=bool(progress))
+        self.check(progress=bool(progress))
         game_of(self.scenario).equilibrium()
         opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), self._plan)
         with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:
             chunks = Collection(self._plan, self.trials, kept, bar, until)
-            return StudyResult(self, chunks.gather(executor, workers))
+            played = chunks.gather(executor, workers)
+            return StudyResult(self, played, chunks.stopping)
 
     def _manifest(self) -> Manifest:
         return Manifest(
@@ -279,10 +309,12 @@ class StudyResult(Trials):
         The scenario around which the inputs vary.
     seed : int
         The seed of the study.
+    stopping : Stopping or None
+        The rule that was asked when to stop, whether it held or not; None where the number of trials was fixed.
     """
 
-    def __init__(self, study: Study, table: pa.Table) -> None:
-        super().__init__(study.scenario, study.seed, table)
+    def __init__(self, study: Study, table: pa.Table, stopping: Stopping | None = None) -> None:
+        super().__init__(study.scenario, study.seed, table, stopping)
         object.__setattr__(self, "study", study)
 
     study: Study
@@ -338,7 +370,8 @@ class StudyResult(Trials):
     def __repr__(self) -> str:
         asked = f" of {self.study.trials:,}" if self.trials < self.study.trials else ""
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts().items())
-        return f"StudyResult({self.trials:,}{asked} trials: {ends})"
+        by = f"; {self.stopping}" if self.stopping is not None else ""
+        return f"StudyResult({self.trials:,}{asked} trials: {ends}{by})"
 
 
 def load_study(folder: str | os.PathLike[str]) -> StudyResult:
@@ -386,4 +419,9 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
         if len(tables[-1]) < manifest.chunk:
             break
         chunk += 1
-    return StudyResult(study, pa.concat_tables(tables).combine_chunks())
+    try:
+        stopping = from_kept(manifest.rule, held=manifest.stopped is not None, chunk=manifest.chunk)
+    except ValueError as error:
+        place = str(Path(folder, MANIFEST))
+        raise StoreError(place, f"it is no manifest of a study ({error})", "put back a copy of this file") from None
+    return StudyResult(study, pa.concat_tables(tables).combine_chunks(), stopping)

@@ -108,7 +108,8 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario) -> str | None:
     first = chunk * CHUNK
     kind, defender, time = (table[name].to_numpy() for name in ("kind", "defender", "time"))
     with np.errstate(invalid="ignore"):
-        on_grid = np.abs(time / sc.step - np.round(time / sc.step)) <= 1e-6
+        steps = time / sc.horizon * round(sc.horizon / sc.step)
+        on_grid = np.abs(steps - np.round(steps)) <= 1e-6
     within = (time >= 0.0) & (time <= sc.horizon * (1.0 + 1e-9))
     last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon)
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)

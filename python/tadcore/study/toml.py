@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from tadcore import scenarios
-from tadcore._shared.files import parse_toml, read_text
 from tadcore._shared.text import similar
+from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
@@ -39,7 +39,12 @@ _KEYS = {
 
 def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
     """What a file gives to `tadcore.Study`; raises `ScenarioError`."""
-    data = parse_toml(read_text(path), os.fspath(path))
+    return parse_study(read_text(path), os.fspath(path), Path(path).parent)
+
+
+def parse_study(text: str, name: str, folder: Path) -> dict[str, Any]:
+    """What a text gives to `tadcore.Study`: errors of syntax are reported under a name, files are found in a folder."""
+    data = parse_toml(text, name)
     for key, value in data.items():
         if key not in _KEYS:
             hint = similar(key, _KEYS) or f"the keys are {', '.join(_KEYS)}"
@@ -51,7 +56,7 @@ def read_study(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ScenarioError("vary", data["vary"], _KEYS["vary"])
     vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(data["vary"]).items()}
     options: dict[str, Any] = {key: data[key] for key in ("seed", "design") if key in data}
-    return {"sc": _scenario(data["scenario"], Path(path).parent), "vary": vary, "trials": data["trials"], **options}
+    return {"sc": _scenario(data["scenario"], folder), "vary": vary, "trials": data["trials"], **options}
 
 
 def _scenario(source: Any, beside: Path) -> Scenario:

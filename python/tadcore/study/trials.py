@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import ByPath
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
+from tadcore.statistics.stopping import Stopping
 
 from .table import FIXED
 
@@ -29,6 +31,7 @@ class Trials:
     scenario: Scenario
     seed: int
     table: pa.Table
+    stopping: Stopping | None = None
 
     @property
     def trials(self) -> int:
@@ -52,8 +55,11 @@ class Trials:
 
     @cached_property
     def inputs(self) -> dict[str, Floats]:
-        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column."""
-        return {name: self._column(name) for name in self.table.column_names if name not in FIXED}
+        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column.
+
+        Any spelling of a path finds it: ``inputs["d1.visibility_radius"]``.
+        """
+        return ByPath({name: self._column(name) for name in self.table.column_names if name not in FIXED})
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way."""
@@ -61,46 +67,43 @@ class Trials:
         return {kind.name.lower(): int(many[kind]) for kind in OutcomeKind}
 
     def probabilities(
-        self, *, level: float = 0.95, method: Literal["wilson", "exact"] = "wilson"
+        self, *, level: float | None = None, method: Literal["wilson", "exact", "sequence"] | None = None
     ) -> OutcomeProbabilities:
         """How often each outcome came, with intervals: see `tadcore.statistics.probabilities`.
 
         Parameters
         ----------
         level : float, optional
-            Confidence level of each interval.
-        method : {"wilson", "exact"}, optional
-            Wilson's score interval or Clopper and Pearson's exact one.
+            Confidence level; 0.95, or that of the rule that was asked when to stop.
+        method : {"wilson", "exact", "sequence"}, optional
+            Wilson's score interval, Clopper and Pearson's exact one, or a confidence sequence. Where a rule was asked
+            when to stop, the sequence is the default, with `HalfWidth` the rule's own intervals, and the other two are
+            refused: they hold for a number of trials that was fixed beforehand.
+
+        Raises
+        ------
+        ScenarioError
+            An option breaks a rule.
         """
-        from tadcore.statistics import probabilities
+        from tadcore.statistics import probabilities_of
 
-        return probabilities(self.kind, self.defender, self.scenario.n, level=level, method=method)
+        return probabilities_of(self, level=level, method=method)
 
-    def incidence(self, *, level: float = 0.95, jointly: bool = False) -> Incidence:
+    def incidence(self, *, level: float | None = None, jointly: bool = False) -> Incidence:
         """When each outcome came, as cumulative curves with bands: see `tadcore.statistics.incidence`.
 
         Parameters
         ----------
         level : float, optional
-            Confidence level of each band over all instants.
+            Confidence level of each band over all instants; 0.95, or that of the rule that was asked when to stop.
         jointly : bool, optional
             Whether the bands hold for all curves at once.
         """
-        from tadcore.statistics import incidence
+        from tadcore.statistics import incidence_of
 
-        sc = self.scenario
-        return incidence(
-            self.kind,
-            self.defender,
-            self.time,
-            horizon=sc.horizon,
-            step=sc.step,
-            n=sc.n,
-            level=level,
-            jointly=jointly,
-        )
+        return incidence_of(self, level=level, jointly=jointly)
 
-    def compare(self, other: TrialOutcomes, *, level: float = 0.95) -> Comparison:
+    def compare(self, other: TrialOutcomes, *, level: float | None = None) -> Comparison:
         """Set this study beside another on the same draws, trial by trial: see `tadcore.statistics.compare`.
 
         Parameters
@@ -108,18 +111,18 @@ class Trials:
         other : StudyResult
             A study of the same seed and trials over a game that differs.
         level : float, optional
-            Confidence level of each interval.
+            Confidence level of each interval; 0.95, or that of the rule that was asked when to stop.
         """
         from tadcore.statistics import compare
 
         return compare(self, other, level=level)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The table as a pandas data frame."""
+        """The table as a pandas data frame; ``outcome`` is a categorical."""
         return self.table.to_pandas()
 
     def to_polars(self) -> polars.DataFrame:
-        """The table as a Polars data frame; Polars must be installed."""
+        """The table as a Polars data frame, ``outcome`` as a categorical; Polars must be installed."""
         import polars
 
         frame = polars.from_arrow(self.table)

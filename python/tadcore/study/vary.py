@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tadcore._shared.text import similar
 from tadcore.errors import ScenarioError
 from tadcore.sampling.adapters import as_sampler
 from tadcore.sampling.base import Sampler
+from tadcore.scenario.hints import hint, wildcards
 from tadcore.scenario.model import Scenario
-from tadcore.scenario.paths import beyond, expand, normal, short
+from tadcore.scenario.paths import beyond, expand, normal
 from tadcore.scenario.quantities import STATES, Quantity, quantities_of
 
 
@@ -53,7 +53,6 @@ def _rule(sc: Scenario, known: Mapping[str, Quantity], path: str) -> str:
         return f"a position or a radius: anything else makes another game, which {way} varies"
     if sc.interaction == "I1" and normal(path) == "target.visibility_radius":
         return "left out: it belongs to interaction I2, and this is I1, where the target sees all"
-    shown = dict.fromkeys(short(name) for name in known)
-    hint = similar(short(path), [*shown, *(f"d*{name[2:]}" for name in shown if name.startswith("d1."))], cutoff=0.4)
+    nearest = hint(path, wildcards(known))
     some = "attacker.position, d*.visibility_radius or d1.capture_radius"
-    return beyond(sc.n, path) or f"the path of a position or a radius, such as {some}{hint and f'; {hint}'}"
+    return beyond(sc.n, path) or f"the path of a position or a radius, such as {some}{nearest and f'; {nearest}'}"

@@ -7,12 +7,17 @@ import os
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tadcore._shared.files import destination, strange, write_whole
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import game_of
 from tadcore.scenario.model import Scenario
 
+if TYPE_CHECKING:
+    from tadcore._core import Game
+
+_START = 40  # bytes in which a table says how long it is
 _MAGIC = b"tadtable"  # how every saved table begins, whatever its format; a test compares it with the core's
 
 
@@ -30,7 +35,7 @@ def warm(sc: Scenario, path: Path | None) -> Iterator[None]:
     held = 0
     if _is_table(path):
         try:
-            held = game.load_table(path.read_bytes())
+            held = _load(game, path)
         except (ValueError, OSError) as error:
             warnings.warn(f"{path}: {error}; the study starts with an empty table", RuntimeWarning, stacklevel=4)
     yield
@@ -58,3 +63,14 @@ def _is_table(path: Path) -> bool:
     if begins not in (_MAGIC, b""):
         raise ScenarioError("table", os.fspath(path), f"{rule}: this is another file, which would be lost")
     return True
+
+
+def _load(game: Game, path: Path) -> int:
+    """Entries that the game holds with those of the file, whose size is checked before it is read."""
+    with path.open("rb") as stream:
+        size = os.fstat(stream.fileno()).st_size
+        length = game.table_length(stream.read(_START))
+        if size != length:
+            raise ValueError(f"the table is damaged: it has {size:,} bytes, and says {length:,}")
+        stream.seek(0)
+        return game.load_table(stream.read(length))

@@ -46,8 +46,13 @@ def _submitted(plan: Plan, jobs: Sequence[Job], executor: Executor, threads: int
                 return
 
     try:
-        with _told(plan):
-            submit()
+        try:
+            with _told(plan):
+                submit()
+        except RuntimeError as error:
+            if "shutdown" not in str(error):
+                raise
+            raise ScenarioError("executor", executor, "open: this one has been shut down") from error
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             # What is whole comes first, so that it is kept when a worker has died beside it.

@@ -239,6 +239,11 @@ impl Game {
         })
     }
 
+    /// The bytes of the saved table that begins with these.
+    fn table_length(&self, py: Python<'_>, start: &[u8]) -> PyResult<u64> {
+        guarded(|| self.policy(py)?.transitions_length(start).map_err(|error| errors::table(py, error)))
+    }
+
     /// Adds the entries of a saved table; the number of entries held afterwards.
     fn load_table(&self, py: Python<'_>, table: &[u8]) -> PyResult<usize> {
         guarded(|| {

@@ -105,6 +105,14 @@ pub enum TableError {
     /// A table of other weights, another grid or another version.
     #[error("the table belongs to another game, or to another version of tadcore")]
     OtherGame,
+    /// More than a table may hold.
+    #[error("the table says that it has {found} entries, and a table of this game has at most {most}")]
+    TooMany {
+        /// The entries that it says it has.
+        found: u64,
+        /// Entries that fit into the bytes of a table.
+        most: usize,
+    },
     /// Cut short or changed.
     #[error("the table is damaged: its length or its checksum is wrong")]
     Damaged,

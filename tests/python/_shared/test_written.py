@@ -360,6 +360,21 @@ def test_a_mode_that_cannot_be_kept_for_another_reason_is_an_error(tmp_path, mon
     assert (path.read_text(), names(tmp_path)) == ("before", ["file"])
 
 
+@pytest.mark.skipif(not ROOT, reason="only the superuser mounts")
+def test_a_file_that_is_mounted_alone_is_written_in_place(tmp_path):
+    outside, inside = tmp_path / "outside", tmp_path / "inside"
+    outside.write_text("before, and longer")
+    inside.touch()
+    if subprocess.run(["mount", "--bind", outside, inside], capture_output=True).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        write_whole(inside, "after")
+        assert outside.read_text() == "after"
+        assert names(tmp_path) == ["inside", "outside"]
+    finally:
+        subprocess.run(["umount", inside], check=True)
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, OSError("no number"), ValueError])
 @pytest.mark.parametrize("name", ["file", "fifo"])
 def test_what_fails_half_way_leaves_what_was_there(tmp_path, error, name):

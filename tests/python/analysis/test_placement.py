@@ -3,7 +3,7 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
-from scipy.stats import beta
+from scipy.stats import beta, norm
 
 import tadcore
 from tadcore import ScenarioError, best_start, probability_map
@@ -158,3 +158,18 @@ def test_the_figure_shows_the_outcome_asked_for(found):
             found.plot(outcome="d9")
     finally:
         mpl.use(before)
+
+
+def test_the_fresh_draws_are_checked_before_the_search(study, monkeypatch):
+    """The study's own draws are games, those of the fresh seed are not."""
+    vary = {"d1.visibility_radius": norm(1.0, 0.25)}
+
+    def least(seed):
+        drawn = study.replace(vary=vary, trials=2000, seed=seed).inputs()
+        return drawn["defenders.0.visibility_radius"].min()
+
+    own = next(seed for seed in range(1000) if least(seed) > 0.1)
+    fresh = next(seed for seed in range(1000) if least(seed) <= 0.1)
+    monkeypatch.setattr(placement.Placed, "events", lambda *_, **__: pytest.fail("a game was played"))
+    with pytest.raises(ScenarioError, match=r"visibility_radius, trial [\d,]+: got"):
+        best_start(study.replace(vary=vary, trials=2000, seed=own), "d3", x=(-2, 1), y=(-1, 2), seed=fresh)

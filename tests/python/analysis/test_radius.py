@@ -4,10 +4,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import tadcore
 from tadcore import ScenarioError, radius_curve
+from tadcore.sampling import Disk
 from tadcore.statistics import paired, probabilities, proportion_interval
+from tadcore.statistics.intervals import ends
 
 RADII = np.array([0.3, 0.8, 1.3, 1.8, 2.25, 2.8])
 
@@ -42,10 +45,26 @@ def test_every_radius_is_a_batch_of_its_own(sc, positions, curve):
         assert np.array_equal(curve.estimate[:, r], alone.estimate)
         assert np.array_equal(curve.low[:, r], alone.low)
         assert np.array_equal(curve.high[:, r], alone.high)
-        wide = proportion_interval(alone.count, 60, level=1 - 0.05 / len(RADII))
+        wide = proportion_interval(alone.count, 60, level=1 - 0.05 / len(RADII), method="exact")
         assert np.array_equal((curve.band_low[:, r], curve.band_high[:, r]), wide)
     assert ((curve.band_low <= curve.low) & (curve.high <= curve.band_high)).all()
     assert np.ptp(curve.estimate[2]) > 0.1
+
+
+def test_the_smallest_radius_is_the_first_whose_band_reaches(curve):
+    for outcome, row in (("intercepted", 2), ("captured", 1)):
+        for least in (0.05, 0.2, 0.5, 0.9):
+            found = curve.smallest(least, outcome)
+            reaching = [r for r, low in zip(RADII, curve.band_low[row], strict=True) if low >= least]
+            assert found.radius == (reaching[0] if reaching else None)
+            assert found.best == RADII[curve.estimate[row].argmax()]
+            shown = list(RADII).index(found.radius if reaching else found.best)
+            assert (found.low, found.high) == (curve.band_low[row, shown], curve.band_high[row, shown])
+    assert repr(curve.smallest(0.99)).startswith("none reaches 0.99; the best is ")
+    with pytest.raises(ScenarioError, match="at_least"):
+        curve.smallest(1.0)
+    with pytest.raises(ScenarioError, match="one of timeout"):
+        curve.smallest(0.5, "d9")
 
 
 def test_differences_and_slopes_are_paired(curve):
@@ -206,12 +225,37 @@ def test_starts_are_needed(sc):
         radius_curve(sc, np.empty((0, 5, 2)), radii=[1.0])
 
 
-def test_a_band_covers_all_radii_more_often_than_intervals_do():
-    """Bonferroni at work on independent radii: 1 - (1 - α / R)^R stays near and below α."""
-    rng, radii, trials = np.random.Generator(np.random.Philox(4)), 8, 200
-    counts = rng.binomial(trials, 0.4, (400, radii))
-    for level, most in ((1 - 0.1 / radii, 0.1), (0.9, 1.0)):
-        low, high = proportion_interval(counts, trials, level=level)
-        missed = ((low > 0.4) | (high < 0.4)).any(axis=1).mean()
-        assert missed <= most + 4 * np.sqrt(0.09 / 400)
-    assert missed > 0.4  # while intervals by themselves miss somewhere in about 1 - 0.9^8 = 57 %
+@pytest.mark.parametrize(
+    ("trials", "radii", "level"), [(1_000, 21, 0.95), (1_000, 1, 0.95), (60, 5, 0.9), (40, 3, 0.5)]
+)
+def test_a_band_holds_at_all_radii_for_every_probability(trials, radii, level):
+    """Exact: the binomial probability that one radius misses is at most 1 / R of 1 - level, at tiny p too."""
+    low, high = band_of(np.arange(trials + 1), trials, radii, level)
+    tiny, even = np.geomspace(1e-9, 0.5, 400), np.linspace(0.005, 0.5, 100)
+    for p in [*tiny, *even, *(1 - tiny), *(1 - even)]:
+        missed = stats.binom.pmf(np.arange(trials + 1), trials, p)[(low > p) | (p > high)].sum()
+        assert missed <= (1 - level) / radii * (1 + 1e-9)
+
+
+def band_of(counts, trials, radii, level):
+    """The band that `radius_curve` makes of counts, through games whose outcomes were replaced by them."""
+    return ends(counts, trials, (1 - level) / radii, "exact")
+
+
+def test_the_band_of_a_curve_is_that_band(curve):
+    found = band_of(np.rint(curve.estimate * 60).astype(int), 60, len(RADII), 0.95)
+    assert np.allclose((curve.band_low, curve.band_high), found, rtol=1e-12, atol=1e-15)
+
+
+def test_wilson_s_intervals_would_not_hold_there():
+    """Why the band is an exact one: at a rare outcome a single radius misses 36 times as often as its share."""
+    counts, p = np.arange(1001), 8.94e-5
+    low, high = proportion_interval(counts, 1000, level=1 - 0.05 / 21)
+    missed = stats.binom.pmf(counts, 1000, p)[(low > p) | (p > high)].sum()
+    assert missed == pytest.approx(0.086, abs=0.001)
+
+
+def test_a_study_need_not_be_played_first(sc):
+    study = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 1.0)}, trials=40, seed=3)
+    fresh, played = (radius_curve(source, player="d1", radii=[1.0, 5.0]) for source in (study, study.run()))
+    assert np.array_equal(fresh.kind, played.kind)

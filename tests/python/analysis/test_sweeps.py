@@ -7,6 +7,7 @@ import tadcore
 from study_cases import CHUNK, ESCAPE, escaping, parts, study
 from tadcore import ScenarioError, Study, sweep
 from tadcore.sampling import Box
+from tadcore.statistics import proportion_interval
 
 
 def test_every_cell_is_the_study_of_its_scenario():
@@ -26,6 +27,8 @@ def test_every_cell_is_the_study_of_its_scenario():
             at = data.sel({"attacker.control_weight": weight, "horizon": horizon})
             assert {str(k): int(v) for k, v in zip(at["outcome"].values, at["count"], strict=True)} == alone.counts()
             assert float(at["probability"].sum()) == pytest.approx(1.0)
+            ends = proportion_interval(at["count"].values, 400)
+            assert np.array_equal((at["low"].values, at["high"].values), ends)
             for kind, mean in enumerate(at["mean_time"].values):
                 times = alone.time[alone.kind == kind]
                 assert np.isnan(mean) if not len(times) else mean == pytest.approx(times.mean())
@@ -47,7 +50,7 @@ def test_a_cell_without_equilibrium_is_a_result():
     assert data["escape_time"].values[2:] == pytest.approx([ESCAPE] * 2, rel=1e-9)
     assert np.isnan(data["escape_time"].values[:2]).all()
     assert data["trials"].values.tolist() == [100, 100, 0, 0]
-    assert np.isnan(data["probability"].values[2:]).all()
+    assert np.isnan([data[name].values[2:] for name in ("probability", "low", "high")]).all()
     assert swept.cells[2].result is None
     assert repr(swept) == "SweepResult(horizon (4); 2 without equilibrium)"
 
@@ -104,3 +107,13 @@ def test_a_grid_that_cannot_be_swept_is_refused_before_any_cell_runs(grid, words
     monkeypatch.setattr(Study, "run", lambda *_, **__: pytest.fail("a cell was run"))
     with pytest.raises(ScenarioError, match=words):
         sweep(study(10), grid)
+
+
+def test_the_draws_of_every_cell_are_checked_before_any_runs(monkeypatch, tmp_path):
+    base = study(3 * CHUNK, vary={"d1.visibility_radius": Box(0.5, 4.0)})
+    smallest = float(base.inputs()["defenders.0.visibility_radius"].min())
+    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    with pytest.raises(ScenarioError, match=rf"trial [\d,]+: got .* capture radius, {smallest!r}") as caught:
+        sweep(base, {"d1.capture_radius": [0.1, 0.2, smallest]}, store=tmp_path / "store")
+    assert caught.value.__notes__ == [f"(in the cell defenders.0.capture_radius = {smallest!r})"]
+    assert not (tmp_path / "store").exists()

@@ -109,9 +109,9 @@ def test_a_game_without_equilibrium_leaves_with_1(tadcore, monkeypatch):
     assert "0.115" in err
 
 
-def subprocess_run(*arguments, **environment):
+def subprocess_run(*arguments, cwd=None, **environment):
     command = [sys.executable, "-c", "from tadcore.cli import main; main()", *arguments]
-    return subprocess.run(command, capture_output=True, check=False, env={**os.environ, **environment})
+    return subprocess.run(command, capture_output=True, check=False, cwd=cwd, env={**os.environ, **environment})
 
 
 def test_a_terminal_without_greek_still_gets_an_answer():
@@ -135,3 +135,194 @@ def test_a_closed_pipe_is_no_catastrophe():
         err = process.stderr.read()
         process.wait()
     assert b"Traceback" not in err
+
+
+ENCODINGS = ["ascii", "gbk", "cp932", "cp1253", "cp1252", "latin-1", "utf-8", "utf-16"]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_scenario_printed_into_a_file_is_read_again(tmp_path, encoding):
+    """Whatever the locale says, a scenario is UTF-8."""
+    for name in ("paper-i1", "paper-i2"):
+        done = subprocess_run("scenarios", name, PYTHONIOENCODING=encoding)
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert done.stdout == scenarios.text(name).encode("utf-8")
+        place = tmp_path / "my.toml"
+        place.write_bytes(done.stdout)
+        assert subprocess_run("validate", str(place), PYTHONIOENCODING=encoding).returncode == 0
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_a_locale_of_any_kind_gets_its_scenario(encoding):
+    done = subprocess_run("scenarios", "paper-i1", LC_ALL="C", PYTHONCOERCECLOCALE="0", PYTHONUTF8="0")
+    assert done.stdout == scenarios.text("paper-i1").encode("utf-8")
+
+
+def piped(given, *arguments, **environment):
+    command = [sys.executable, "-c", "from tadcore.cli import main; main()", *arguments]
+    return subprocess.run(command, input=given, capture_output=True, check=False, env={**os.environ, **environment})
+
+
+STUDY = b'scenario = "paper-i1"\ntrials = 20\n[vary]\n"attacker.position" = { box = [[-3, -3], [3, 3]] }\n'
+
+
+def test_standard_input_stands_for_a_file(tmp_path):
+    text = scenarios.text("paper-i1")
+    for encoding in ("utf-8", "utf-16"):
+        done = piped(text.encode(encoding), "validate", "-", PYTHONIOENCODING="ascii")
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert done.stdout.startswith(b"-: valid\n")
+    out = tmp_path / "run"
+    done = piped(text.encode(), "simulate", "-", "--set", "d1.visibility_radius=2", "--out", str(out))
+    assert done.returncode == 0
+    assert (out / "summary.json").exists()
+    done = piped(text.encode(), "map", "-", "--size", "3", "--out", str(tmp_path / "map.nc"))
+    assert done.returncode == 0
+    done = piped(STUDY, "study", "-", "--store", str(tmp_path / "store"))
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, b"20 trials")
+    for command in (("validate", "-"), ("study", "-", "--store", str(tmp_path / "other"))):
+        done = piped(b"horizon = \n", *command)
+        assert done.returncode == 2
+        assert done.stderr.startswith(b"error: standard input, line 1: ")
+        done = piped(b"\xff", *command)
+        assert done.stderr.startswith(b"error: standard input: got b'\\xff', must be text in UTF-8")
+        assert done.returncode == 2
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize("columns", ["0", "-1", "1", "x", "", "9" * 30])
+def test_a_terminal_of_any_width_gets_its_answer(columns):
+    for environment in ({"COLUMNS": columns}, {"COLUMNS": columns, "FORCE_COLOR": "1"}, {"LINES": columns}):
+        done = subprocess_run("validate", "paper-i1", **environment)
+        words = b" ".join(done.stdout.split())
+        assert words.startswith(b"paper-i1: valid I1, defenders against attacker and target")
+        assert words.endswith(b"captures within 0.1")
+        done = subprocess_run("validate", "nothing-like-it", **environment)
+        assert done.returncode == 2
+        assert b"must be a file, or the name of a bundled scenario" in b" ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize("term", ["dumb", "", "unknown"])
+def test_a_poor_terminal_gets_its_answer(term):
+    environment = {key: value for key, value in os.environ.items() if key != "HOME"}
+    command = [sys.executable, "-c", "from tadcore.cli import main; main()", "validate", "paper-i1"]
+    done = subprocess.run(command, capture_output=True, check=False, env={**environment, "TERM": term})
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.startswith(b"paper-i1: valid")
+
+
+def test_output_that_is_closed_is_no_catastrophe():
+    for command in ("scenarios paper-i1", "validate paper-i1", "validate nix"):
+        line = f"{sys.executable} -m tadcore {command}"
+        assert subprocess.run(["sh", "-c", f"{line} >&- 2>&-"], check=False).returncode == (
+            2 if "nix" in command else 0
+        )
+        done = subprocess.run(["sh", "-c", f"{line} > /dev/full"], check=False, capture_output=True)
+        assert done.returncode == 2
+        assert b"Traceback" not in done.stderr
+
+
+ODD = ["nan", "inf", "-inf", "0", "-1", "1e-320", "5e-324", "1e308", "-1e308", "1e400", "9" * 400, "x", "", "1" * 5000]
+"""What an option of a number may be given."""
+
+
+@pytest.mark.parametrize("value", ODD)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("map", "paper-i1", "--size", "3", "--x", "{}", "1"),
+        ("map", "paper-i1", "--size", "3", "--x", "0", "{}"),
+        ("map", "paper-i1", "--size", "3", "--y", "{}", "1"),
+        ("map", "paper-i1", "--size", "3", "--y", "0", "{}"),
+        ("map", "paper-i1", "--size", "3", "--x", "-{}", "{}"),
+        ("map", "paper-i1", "--size", "3", "--z", "{}"),
+        ("map", "paper-i1", "--size", "{}"),
+        ("map", "paper-i1", "--size", "3", "--threads", "{}"),
+        ("map", "paper-i1", "--size", "3", "--player", "{}"),
+        ("map", "paper-i1", "--size", "3", "--set", "d1.visibility_radius={}"),
+        ("map", "paper-i1", "--size", "3", "--set", "step={}"),
+        ("verify", "paper-i1", "--set", "horizon=0.05", "--seed", "{}"),
+        ("explore", "paper-i1", "--port", "{}", "--no-browser", "--set", "horizon=-1"),
+    ],
+)
+def test_an_odd_number_is_taken_or_refused_by_name(tadcore, tmp_path, arguments, value):
+    """No option takes the command line down: 0, or 2 and one sentence that names what is wrong."""
+    given = [argument.format(value) for argument in arguments]
+    if arguments[0] == "map":
+        given += ["--out", tmp_path / "map.png"]
+    code, out, err = tadcore(*given)
+    assert code in (0, 2) or (code == 1 and arguments[0] == "verify")
+    if code == 2:
+        assert out == ""
+        assert "rror" in err
+        assert len(err) < 7000
+        assert not (tmp_path / "map.png").exists()
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "0", "1", "-1", "2", "x"])
+def test_an_odd_level_is_refused_by_name(tadcore, tmp_path, value):
+    study = tmp_path / "study.toml"
+    study.write_bytes(STUDY)
+    assert tadcore("study", study, "--store", tmp_path / "store")[0] == 0
+    code, _, err = tadcore("report", tmp_path / "store", "--out", tmp_path / "page.html", "--level", value)
+    assert code == 2
+    assert "level" in err
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_name_that_no_file_can_have_is_refused_before_anything_is_computed(tadcore, tmp_path):
+    long = tmp_path / ("x" * 300)
+    study = tmp_path / "study.toml"
+    study.write_bytes(STUDY.replace(b"20", b"2_000_000_000"))
+    for command in (
+        ("map", "paper-i1", "--size", "100000", "--out", f"{long}.png"),
+        ("verify", "paper-i1", "--starts", "1000", "--json", long),
+        ("simulate", "paper-i1", "--out", long),
+        ("study", study, "--store", long),
+        ("study", study, "--store", tmp_path / "store", "--table", long),
+        ("report", tmp_path, "--out", long),
+        ("reproduce", "--out", long),
+        ("validate", long),
+    ):
+        code, out, err = tadcore(*command)
+        assert (code, out) == (2, "")
+        assert "File name too long" in err
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "TkAgg", "nonsense"])
+def test_figures_for_files_need_no_display_and_no_backend(tmp_path, backend):
+    """``!tadcore`` in a notebook of another kernel inherits that one's backend."""
+    environment = {"MPLBACKEND": backend, "DISPLAY": ""}
+    study = tmp_path / "study.toml"
+    study.write_bytes(STUDY)
+    files = (("map", "paper-i1", "--size", "5", "--out", "m.png"),)
+    more = (
+        ("map", "paper-i1", "--size", "5", "--time", "--out", "m.pdf"),
+        ("simulate", "paper-i1", "--out", "run", "--plot"),
+        ("study", "study.toml", "--store", "store"),
+        ("report", "store", "--out", "page.html"),
+    )
+    for command in files + (more if backend == "TkAgg" else ()):
+        done = subprocess_run(*command, cwd=tmp_path, **environment)
+        assert (done.returncode, done.stderr) == (0, b""), command
+    assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
+    done = subprocess_run("simulate", "paper-i1", "--plot", cwd=tmp_path, **environment)
+    assert done.returncode == 2
+    assert b"no display to draw on" in done.stderr
+
+
+def test_savers_leave_the_backend_and_the_figures_of_the_user_alone(tmp_path):
+    code = """
+import sys, os, matplotlib, tadcore
+run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+found = tadcore.outcome_map(tadcore.scenarios.load("paper-i1"), x=(-2, 2, 3), y=(-2, 2, 3))
+found.save(sys.argv[1])
+run.animate(seconds=0.2, fps=5).save(sys.argv[2])
+assert matplotlib.rcParams._get("backend") == "TkAgg"
+import matplotlib.pyplot as plt
+assert plt.get_fignums() == []
+"""
+    environment = {**os.environ, "MPLBACKEND": "TkAgg", "DISPLAY": ""}
+    command = [sys.executable, "-c", code, str(tmp_path / "m.png"), str(tmp_path / "m.gif")]
+    done = subprocess.run(command, capture_output=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"")

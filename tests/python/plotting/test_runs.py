@@ -149,7 +149,7 @@ def test_controls_of_chosen_players(runs):
     ax = plotting.controls(runs["paper-i2"], "y", players=["target", "attacker"], ax=agg_figure()[1], changes=False)
     assert len(ax.lines) == 2
     assert len(plotting.controls(runs["paper-i2"], players="d2", ax=agg_figure()[1], changes=False).lines) == 1
-    with pytest.raises(ValueError, match="no player 'd9'"):
+    with pytest.raises(ValueError, match="players: got 'd9', must be one of d1, d2, d3"):
         plotting.controls(runs["paper-i2"], players=["d9"], ax=agg_figure()[1])
     with pytest.raises(ValueError, match="axis: got 'z', must be one of x, y"):
         plotting.controls(runs["paper-i2"], "z", ax=agg_figure()[1])

@@ -1,7 +1,9 @@
 """What a stranger may put in the place of a file, a name or an entry: a clear error, at once, and a clean terminal."""
 
+import contextlib
 import os
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import pytest
 import tadcore
 from study_cases import calm, resealed, study
 from tadcore import Scenario, ScenarioError, StoreError
-from tadcore._shared.files import parse_toml
+from tadcore._shared.toml import parse_toml
 from tadcore.cli.app import main
 from tadcore.sampling import Box, Choice
 
@@ -56,6 +58,18 @@ def test_what_is_no_file_is_refused_in_a_store(tmp_path, kind, name):
         with pytest.raises(StoreError, match=f"it is {kind}, not a file") as caught:
             use(folder)
         assert caught.value.path == str(folder / name)
+
+
+@KINDS
+def test_what_is_no_lock_is_refused_in_a_store(tmp_path, kind):
+    folder = tmp_path / "store"
+    whole = study(300).run(store=folder)
+    put(folder / "_store.lock", kind)
+    words = "it is a link" if kind == "a device" else f"it is {kind}, not a file"
+    with pytest.raises(StoreError, match=words) as caught:
+        study(300).run(store=folder)
+    assert caught.value.path == str(folder / "_store.lock")
+    assert tadcore.load_study(folder).table.equals(whole.table)
 
 
 def test_a_pipe_for_a_table_of_gains_is_refused(tmp_path):
@@ -124,6 +138,93 @@ def test_a_key_of_many_parts_is_refused_before_it_is_parsed(part, text):
     with pytest.raises(ScenarioError, match=r"line \d: got .*, must be valid TOML with keys of at most 100 parts"):
         parse_toml(text.format(".".join([part] * 50_000)), "given")
     assert parse_toml(text.format(".".join([part] * 50)), "given")
+
+
+LONG = ".".join("a" * 60) * 2  # what a dotted key must not be, so that every text is read for one
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '# {} \\"',
+        "# {} \\'",
+        '#{}\n"',
+        "#{}\n'",
+        '#{}\nx = "\\"',
+        '#{}\nx = """\\"',
+        '#{}\n"\\\n',
+        '#{}\nx = """"',
+        "#{}\nx = " + 4 * "'",
+        "#{}\nx ",
+        "#{}\n[",
+        '#{}\n["(at ',
+        "{}.",
+        '"{}.',
+        "x = [1.5, {}",
+    ],
+)
+def test_reading_takes_time_in_proportion_to_the_text(text):
+    """The last character, repeated, is where a search that starts anew at each would take the square of the time."""
+    head, _, tail = text.rpartition("{}")
+    stem, last = tail[:-2], tail[-2:]
+
+    def seconds(count):
+        given = head + LONG + stem + last * count
+        given += given.replace(LONG, "") if "[" in tail else ""  # a table twice: the parser's reason has its name in it
+        start = time.process_time()
+        with contextlib.suppress(ScenarioError):
+            parse_toml(given, "given")
+        return time.process_time() - start
+
+    assert seconds(400_000) < 40 * max(seconds(20_000), 0.01)
+
+
+@pytest.mark.parametrize("deep", [100, 101])
+@pytest.mark.parametrize(
+    "text",
+    [
+        'x = {{ a = """x"""", {} = 1 }}',
+        "x = {{ a = QQQxQQQQ, {} = 1 }}".replace("Q", "'"),
+        'x = """ \\""" """\n{} = 1',
+        'x = "\\"" # "\n{} = 1',
+    ],
+)
+def test_no_string_hides_a_key_of_many_parts(text, deep):
+    key = ".".join("b" * deep)
+    if deep == 100:
+        assert parse_toml(text.format(key), "given")
+    else:
+        with pytest.raises(ScenarioError, match="keys of at most 100 parts"):
+            parse_toml(text.format(key), "given")
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-le", "utf-32-be"]
+)
+def test_a_text_with_a_byte_order_mark_is_read(tmp_path, encoding):
+    """PowerShell 5.1 writes UTF-16 for ``>``."""
+    mark = "\ufeff" if encoding[-2:] in ("le", "be") else ""
+    file = tmp_path / "given.toml"
+    file.write_bytes((mark + "# \u03bb, \u96fb, \U0001f9ea\r\n" + TEXT).encode(encoding))
+    assert Scenario.from_toml(file) == Scenario.from_toml_string(TEXT)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32-le", "latin-1", "gbk"])
+def test_another_encoding_is_named(tmp_path, encoding):
+    file = tmp_path / "given.toml"
+    file.write_bytes(f"# \xe9\n{TEXT}".encode(encoding))
+    with pytest.raises(ScenarioError, match=r"given\.toml: got .*, must be text in UTF-8, or in UTF-16 with"):
+        Scenario.from_toml(file)
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match=r"must be text in UTF-8"):
+        Scenario.from_toml(file)
+
+
+@pytest.mark.parametrize("given", [None, 5, b"horizon = 1", ["x"], 1.5])
+def test_what_is_no_text_is_refused(given):
+    for use in (Scenario.from_toml_string, tadcore.Study.from_toml_string):
+        with pytest.raises(ScenarioError, match="must be a text in TOML"):
+            use(given)
 
 
 def test_numbers_and_sentences_are_no_long_keys():
@@ -229,7 +330,7 @@ def test_a_masked_entry_is_no_number():
     for draw in (lambda: Box(point, [3.0, 3.0]), lambda: Choice(np.ma.stack([point]))):
         with pytest.raises(ScenarioError):
             draw()
-    with pytest.raises(ScenarioError, match="got nan, must be a finite number"):
+    with pytest.raises(ScenarioError, match="got 'an array with masked entries', must be an array of numbers of shape"):
         tadcore.Study(sc, {"attacker.position": lambda rng, size: np.ma.stack([point] * size)}, trials=5).run()
     whole = tadcore.simulate_batch(sc, np.ma.stack([sc.positions]))
     assert whole[0] == tadcore.simulate(sc).outcome

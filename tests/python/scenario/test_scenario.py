@@ -168,7 +168,8 @@ def test_a_change_of_interaction_leaves_foreign_fields_behind():
 
 
 def test_invalid_parts_are_not_smuggled_in():
-    crooked = Attacker.model_construct(position=(math.nan, 0.0), control_weight=-1.0, capture_radius=0.1)
+    crooked = scenarios.load("paper-i1").attacker
+    crooked.__dict__.update(position=(math.nan, 0.0), control_weight=-1.0)
     with pytest.raises(ScenarioError) as caught:
         Scenario(**table(attacker=crooked))
     assert [e.field for e in caught.value.errors] == ["attacker.position[0]", "attacker.control_weight"]

@@ -60,6 +60,16 @@ def test_the_band_is_kolmogorov_s():
     assert stats.kstwo.sf(curves(level=0.9, jointly=True).half_width, M) == pytest.approx(0.1 / 5, rel=1e-5)
 
 
+@pytest.mark.parametrize("level", [0.5, 0.95, 1 - 2e-5, 1 - 1e-8, 1 - 1e-12, 1 - 2**-53])
+def test_the_band_is_never_too_narrow(level):
+    """The law itself, at levels where its quantiles in SciPy are too small."""
+    for trials in (1, 400, 100_000):
+        found = incidence([1] * trials, [-1] * trials, [1.0] * trials, horizon=1.0, step=1.0, n=1, level=level)
+        half = found.half_width
+        assert half == 1.0 or stats.kstwo.sf(half, trials) <= (1 - level) * 1.001
+        assert half <= math.sqrt(math.log(2 / (1 - level)) / (2 * trials)) + 1e-12
+
+
 def test_bands_hold_everywhere_at_once_on_a_grid():
     """200 studies of 100 trials: the truth leaves the band somewhere in at most 10 %, plus 4 standard errors."""
     truth = np.cumsum(np.full(11, 0.05))

@@ -44,6 +44,27 @@ def test_exact_ends_are_where_the_binomial_tails_turn(count, trials):
     assert high == 1.0 if count == trials else stats.binom.cdf(count, trials, high) == pytest.approx(0.05, rel=1e-6)
 
 
+@pytest.mark.parametrize("trials", [10, 40, 200, 1_000])
+def test_wilson_s_coverage_falls_to_83_percent_and_no_further(trials):
+    """Exact: between two ends of intervals the coverage rises, then falls, so the worst p is beside an end."""
+    counts = np.arange(trials + 1)
+    low, high = proportion_interval(counts, trials)
+    worst = {}
+    for p in (*(low[1:] * (1 - 1e-9)), *(high[:-1] * (1 + 1e-9))):
+        worst[p] = stats.binom.pmf(counts, trials, p)[(low <= p) & (p <= high)].sum()
+    p = min(worst, key=worst.get)
+    assert 0.83 < worst[p] < 0.845
+    assert trials * min(p, 1 - p) == pytest.approx(0.18, abs=0.005)
+
+
+@pytest.mark.parametrize("count", [1, 30, 1_000])
+def test_exact_ends_of_a_billion_trials_are_those_of_poisson_s_law(count):
+    """The limit of many trials, by the gamma distribution; the inverse of the beta distribution in SciPy fails here."""
+    low, high = proportion_interval(count, 10**9, level=0.95, method="exact")
+    assert low * 1e9 == pytest.approx(stats.gamma.ppf(0.025, count), rel=1e-5)
+    assert high * 1e9 == pytest.approx(stats.gamma.isf(0.025, count + 1), rel=1e-5)
+
+
 def test_the_coverage_of_the_exact_interval_is_never_below_its_level():
     trials, counts = 30, np.arange(31)
     low, high = proportion_interval(counts, trials, level=0.9, method="exact")

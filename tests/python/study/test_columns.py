@@ -204,7 +204,10 @@ def test_a_part_without_words_is_named(copied):
         tadcore.load_study(copied)
 
 
-@pytest.mark.parametrize(("horizon", "step"), [(0.3, 0.1), (0.7, 0.1), (1.0, 1.0), (2.1, 0.07)])
+DIVIDES_ALMOST = (1.0, 1.0 / 5000 * (1.0 + 5e-10))
+
+
+@pytest.mark.parametrize(("horizon", "step"), [(0.3, 0.1), (1.3, 0.1), (1.0, 1.0), (2.1, 0.07), DIVIDES_ALMOST])
 def test_every_end_of_a_real_study_is_accepted(tmp_path, horizon, step):
     """Also on grids on which k·δ is not the nearest double."""
     result = study(500, sc=calm().replace({"horizon": horizon, "step": step})).run(store=tmp_path)

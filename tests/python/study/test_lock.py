@@ -6,6 +6,7 @@ import fcntl
 import os
 import re
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -43,6 +44,27 @@ def test_a_file_system_without_locks_keeps_a_store(tmp_path, monkeypatch, number
     assert longer.table.slice(0, 300).equals(result.table)
     assert {path.name for path in (tmp_path / "store").iterdir()} == {"_manifest.json", *parts(tmp_path / "store")}
     assert not recwarn.list
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EPERM, errno.ENOTSUP])
+def test_a_mount_that_has_next_to_nothing_keeps_a_store(tmp_path, monkeypatch, number):
+    """No locks, no modes, no owners, no hard links, no fsync of folders: as of object stores, FUSE, CIFS and WSL."""
+    without_locks(monkeypatch)
+    fsync = os.fsync
+
+    def refused(*given, **named):
+        raise OSError(number, os.strerror(number))
+
+    def of_files(descriptor):
+        return refused() if stat.S_ISDIR(os.fstat(descriptor).st_mode) else fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", of_files)
+    for name in ("chmod", "fchmod", "chown", "fchown", "link", "symlink"):
+        monkeypatch.setattr(os, name, refused)
+    folder = tmp_path / "store"
+    result = study(CHUNK + 300).run(store=folder, table=tmp_path / "table")
+    assert study(CHUNK + 300).run(store=folder, table=tmp_path / "table").table.equals(result.table)
+    assert not list(tmp_path.rglob(".*"))
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EBADF])

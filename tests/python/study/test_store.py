@@ -276,6 +276,9 @@ def test_a_manifest_that_is_none_is_named(copied, tmp_path):
     for folder in (copied, tmp_path / "nowhere"):
         with pytest.raises(StoreError, match="there is no such file"):
             tadcore.load_study(folder)
+    for use in (tadcore.load_study, lambda folder: study().run(store=folder)):
+        with pytest.raises(StoreError, match=r"x{300}.*File name too long"):
+            use(tmp_path / ("x" * 300))
 
 
 def test_two_writers_are_refused(tmp_path):

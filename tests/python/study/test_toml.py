@@ -133,7 +133,7 @@ def test_the_command_plays_keeps_and_continues(written, tmp_path, capsys):
         assert out.endswith(f"written to {store}\n")
     result = tadcore.load_study(store)
     for name, count in result.counts().items():
-        assert f"  {name:<12} {count:>12,}  {count / 300:.4f}\n" in out
+        assert f"  {name:<12} {count:>12,}  {count / 300:.4f} [" in out  # its interval follows
     assert run(written(FILE.replace("seed = 5", "seed = 6")), "--store", store) == 2
     assert "holds another study (its seed differ)" in capsys.readouterr().err
     assert run(written(FILE.replace("trials = 300", "trials = 0")), "--store", store) == 2

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -74,17 +75,39 @@ def test_what_is_no_table_is_refused_before_anything_is_made(tmp_path):
     (tmp_path / "link").symlink_to(precious[0])
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
-    before = [path.stat() for path in precious]
+    before = [(path.stat().st_ino, path.stat().st_size, path.stat().st_mtime_ns) for path in precious]
     others = [tmp_path / name for name in ("link", "folder", "pipe", "x" * 300)]
     for path in [*precious, *others]:
         with pytest.raises(
             ScenarioError, match=r"^table: got .* must be a table that a study has saved, or a new name"
         ):
             short().run(table=path, store=tmp_path / "store")
-    assert [path.stat() for path in precious] == before
+    assert [(path.stat().st_ino, path.stat().st_size, path.stat().st_mtime_ns) for path in precious] == before
     assert not (tmp_path / "store").exists()
 
 
 def test_a_table_is_saved_into_a_folder_that_is_made(tmp_path):
     short().run(table=tmp_path / "new" / "folder" / "table.bin")
     assert (tmp_path / "new" / "folder" / "table.bin").read_bytes().startswith(b"tadtable")
+
+
+def test_a_table_of_another_size_is_not_read(tmp_path):
+    kept, other = tmp_path / "table.bin", tmp_path / "other.bin"
+    short().run(table=kept)
+    start = kept.read_bytes()
+    counted = start[:32] + (2**40).to_bytes(8, "little")
+    for content, reason in [
+        (start[:8], "the bytes are not a saved table|the table has format 0"),
+        (start[:40], "the table is damaged: it has 3,221,225,472 bytes, and says"),
+        (counted, "the table says that it has 1099511627776 entries, and a table of this game has at most"),
+    ]:
+        other.write_bytes(content)
+        with other.open("r+b") as stream:
+            stream.truncate(3 << 30)  # a hole
+        tracemalloc.start()
+        with pytest.warns(RuntimeWarning, match=f"other.bin: {reason}"):
+            short().run(table=other)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 64 << 20
+        assert other.read_bytes() == start

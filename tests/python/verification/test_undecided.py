@@ -190,4 +190,38 @@ def test_gradients_and_certificates_of_a_record_are_those_of_the_objective(name)
         eye = np.eye(f.unknowns)
         form = [[bound(x + a + b) - bound(x + a) - bound(x + b) + bound(x) for a in eye] for b in eye]
         spectrum = np.linalg.eigvalsh(form)
-        assert found.certificate[k] == pytest.approx(spectrum[0] / np.abs(spectrum).max(), abs=1e-9)
+        quadratic = f.rows(x).T @ (f.R * f.rows(x))
+        cancels = 4.0 * f.gamma[0] * f.R.max() * (np.linalg.norm(quadratic) + np.linalg.norm(f.constant))
+        assert found.certificate[k] == pytest.approx(spectrum[0] / max(np.abs(spectrum).max(), cancels), abs=1e-9)
+
+
+# ---- rounding that verify causes itself
+
+
+@pytest.mark.parametrize("name", ["paper-i1", "paper-i1-suicidal"])
+@pytest.mark.parametrize("shift", [0.0, 1e7, 1e12])
+def test_a_game_far_from_the_origin_fails_nothing(name, shift):
+    """There positions are stored to 1e-16 of their size, and a game that is turned starts elsewhere by as much."""
+    sc = tadcore.scenarios.load(name).replace({"step": 0.02})
+    away = sc.replace(
+        {f"{player}.position": (at + shift).tolist() for player, at in zip(sc.players, sc.positions, strict=True)}
+    )
+    report = tadcore.verify(away, deviations=1, instants=2)
+    assert not report.failures, report
+    assert report.ok or shift
+    turned = report["geometry.rotation"]
+    assert turned.ok or turned.value > 1e-8
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 1.0])
+def test_the_quadrature_of_the_indices_errs_by_less_than_it_says(step):
+    """The identities are exact: what is left of them is the quadrature's, and rounding."""
+    adapted = v.Adapted(tadcore.simulate(tadcore.scenarios.load("paper-i1").replace(step=step)))
+    for pieces in (adapted.pieces, max(adapted.pieces // 4, 1), 1):
+        adapted.pieces, adapted.step = pieces, step / pieces
+        adapted.steps = adapted.length * pieces
+        for cached in ("weights", "profile", "played"):
+            adapted.__dict__.pop(cached, None)
+        adapted.inside = adapted._values_inside()
+        for index in adapted.index(sampled=False):
+            assert index.error <= index.doubt or not index.converged

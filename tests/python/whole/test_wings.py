@@ -21,7 +21,8 @@ FLOORS = (
     ("statistics",),
     ("game", "scenarios"),
     ("scenario",),
-    ("sampling", "_shared"),
+    ("sampling",),
+    ("_shared",),
     ("errors",),
     ("_core",),
 )

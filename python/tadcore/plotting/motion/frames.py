@@ -33,3 +33,24 @@ def frames_of(run: Recorded, seconds: float, fps: float) -> list[Frame]:
     for k in sorted(shown | (set(changes) if pause else set())):
         frames += [Frame(k, pause=True)] * pause if k in changes and pause else [Frame(k)]
     return frames + [Frame(last, over=True)] * max(round(_END * fps), 1)
+
+
+_SHORTEST = 2  # hundredths of a second: browsers play what is shorter at ten pictures a second
+
+
+def gif_delays(count: int, fps: float) -> dict[int, int]:
+    """Which of the pictures a GIF shows, and for how many hundredths of a second: two at least, the last one always.
+
+    Together they last as long as all pictures do, to a hundredth.
+    """
+    delays: dict[int, int] = {}
+    start = 0
+    for index in range(count):
+        end = round((index + 1) * 100 / fps)
+        if end - start >= _SHORTEST:
+            delays[index] = end - start
+            start = end
+        elif index == count - 1:
+            _, before = delays.popitem() if delays else (0, 0)
+            delays[index] = max(before + end - start, _SHORTEST)
+    return delays

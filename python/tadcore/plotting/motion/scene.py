@@ -20,6 +20,7 @@ from tadcore.plotting.tools.style import edge_text, look, outcome_text
 from .frames import Frame
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
@@ -74,6 +75,22 @@ class Scene:
             if not self._over:
                 disc(self._arena, self._run, dashed=False)
             self._over = True
+
+    @property
+    def space(self) -> bool:
+        """Whether the arena is a box, and not a plane."""
+        return int(self._where.shape[-1]) == 3
+
+    @property
+    def still(self) -> object:
+        """What decides how everything looks that is not in `front`."""
+        return self._network, self._over, self._graph.axison
+
+    def front(self) -> list[Artist]:
+        """Artists from the lowest that moves on upwards, in the order in which they are drawn."""
+        lowest = min(artist.get_zorder() for mover in self._movers for artist in mover.values())
+        arena = [a for a in self._arena.get_children() if a is not self._arena.patch and a.get_zorder() >= lowest]
+        return [*sorted(arena, key=lambda artist: artist.get_zorder()), self._clock, self._event]
 
     def _look_around(self, mover: dict[str, Any], centre: Floats, radius: float) -> None:
         """Put the disc of what a player sees around it; in space the level circle, where it is inside the box."""

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import new_axes
+from tadcore.plotting.tools.axes import new_axes, root_figure
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ def _rows(run: Recorded) -> list[Edge]:
 
 def _name(ax: Axes, rows: list[Edge]) -> None:
     """Name every row where there is room for it, every observer otherwise."""
-    figure = ax.get_figure(root=True) if hasattr(ax.figure, "get_figure") else ax.figure
-    height = 72.0 * ax.get_window_extent().height / (figure.dpi if figure is not None else 100.0)
+    height = 72.0 * ax.get_window_extent().height / root_figure(ax).dpi
     if height >= 0.8 * _ROW * len(rows):
         ax.set_yticks(range(len(rows)), [edge_text(p, [q]) for p, q in rows], fontsize="small")
         return

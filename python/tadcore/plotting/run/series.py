@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.text import one_of
+from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
@@ -58,11 +60,11 @@ def controls(
 
     Raises
     ------
-    ValueError
+    ScenarioError
         The game has no such player or no such axis.
     """
-    shown = [players] if isinstance(players, str) else run.scenario.constrained if players is None else list(players)
-    _known(run, shown)
+    given = [players] if isinstance(players, str) else run.scenario.constrained if players is None else players
+    shown = _known(run, given)
     known_axis(run, axis)
     ax = new_axes(ax, COLUMN, 2.3)
     control = run.control[..., "xyz".index(axis)]
@@ -183,17 +185,17 @@ def to_attacker(run: Recorded) -> list[Floats]:
     return list(np.linalg.norm(run.position[:, :-1] - run.position[:, -1:], axis=-1).T)
 
 
-def _known(run: Recorded, shown: Sequence[str]) -> None:
-    for p in shown:
-        if p not in run.scenario.players:
-            raise ValueError(f"no player {p!r}; this game has {', '.join(run.scenario.players)}")
+def _known(run: Recorded, shown: object) -> list[str]:
+    names = run.scenario.players
+    if not isinstance(shown, Iterable):
+        raise ScenarioError("players", shown, f"a list of some of {', '.join(names)}")
+    return [one_of("players", player, names) for player in shown]
 
 
 def known_axis(run: Recorded, axis: str) -> None:
     """Refuse a component that the game does not have."""
     axes = "xyz"[: run.scenario.dim]
-    if axis not in tuple(axes):
-        raise ValueError(f"axis: got {axis!r}, must be one of {', '.join(axes)}")
+    one_of("axis", axis, axes)
 
 
 def span(times: Floats) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from tadcore._shared.shares import estimate, percent
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.outcomes import boxes, input_label, outcome_look, parts_of, quantity_label, stack
@@ -44,8 +45,9 @@ def outcome_probabilities(found: OutcomeProbabilities, ax: Axes | None = None) -
         it = outcome_look(name)
         ax.barh(row, p, 0.62, facecolor=it.fill, edgecolor="0.35", hatch=it.hatch, linewidth=0.5, zorder=2.0)
         _interval(ax, row, low, high)
+        text, _ = estimate(p, low, high, least=3)
         ax.annotate(
-            f"{p:.3f}", (high, row), xytext=(4, 0), textcoords="offset points", va="center", fontsize="small", zorder=3
+            text, (high, row), xytext=(4, 0), textcoords="offset points", va="center", fontsize="small", zorder=3
         )
     _rows(ax, [outcome_look(name).label for name in found.names])
     ax.set(xlabel="probability", xlim=(0.0, min(1.0, float(found.high.max())) * 1.2))
@@ -87,7 +89,7 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
             i = found.names.index("intercepted")
             for edge in (found.low[i], found.high[i]):
                 ax.step(found.times, edge, where="post", color="black", linewidth=0.8, linestyle=(0, (1, 1.2)))
-            label = f"{100 * found.level:g} % band of interception"
+            label = f"{percent(found.level)} band of interception"
             line = Line2D([], [], color="black", linewidth=0.8, linestyle=(0, (1, 1.2)), label=label)
             handles.append(line)
         above(ax, handles)
@@ -137,7 +139,7 @@ def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, s
             markerfacecolor=it.colour if sure else "white", linestyle="none",
         )  # fmt: skip
     _rows(ax, [outcome_look(name).label for name in found.names])
-    reach = 1.12 * float(max(np.abs(found.low).max(), np.abs(found.high).max()))
+    reach = 1.12 * float(max(np.abs(found.low).max(), np.abs(found.high).max())) or 1.0  # nothing differs: any range
     ax.set(xlabel=f"$P$({names[0]}) − $P$({names[1]})", xlim=(-reach, reach))
     return ax
 
@@ -172,14 +174,16 @@ def radius_curve(
     Raises
     ------
     ValueError
-        No such quantity or outcome.
+        No such quantity or outcome, or no finite radius to draw it at.
     """
     kinds = {"probability": "estimate", "difference": "difference", "slope": "slope"}
     if quantity not in kinds:
         raise ValueError(f"no quantity {quantity!r}; one of {', '.join(kinds)}")
+    finite = np.isfinite(curve.radii)
+    if finite.sum() < (2 if quantity == "slope" else 1):
+        raise ValueError("no finite radius to draw" if quantity != "slope" else "a slope needs two finite radii")
     ax = new_axes(ax, COLUMN, 2.4)
     whose = rf"\{'zeta' if curve.radius == 'visibility' else 'sigma'}_{{{symbol(curve.player)}}}"
-    finite = np.isfinite(curve.radii)
     values, part = curve.radii[finite], kinds[quantity]
     at = (values[1:] + values[:-1]) / 2.0 if quantity == "slope" else values
     low_name, high_name = ("low", "high") if part == "estimate" else (f"{part}_low", f"{part}_high")
@@ -207,7 +211,9 @@ def radius_curve(
         "difference": f"$P - P(\\mathrm{{{'reference'}}})$",
         "slope": rf"$\mathrm{{d}}P/\mathrm{{d}}{whose}$",
     }
-    ax.set(xlabel=f"${whose}$", ylabel=ylabel[quantity], xlim=(float(values[0]), float(values[-1])))
+    ax.set(xlabel=f"${whose}$", ylabel=ylabel[quantity])
+    if values[0] < values[-1]:
+        ax.set_xlim(float(values[0]), float(values[-1]))
     ax.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     label_ends(ax, ends)
     return ax
@@ -254,7 +260,8 @@ def sensitivity(found: Sensitivity, output: str | None = None, ax: Axes | None =
         handles.append(Patch(label=label, **box))
     _rows(ax, [input_label(found.inputs[i]) for i in order])
     ax.axvline(0.0, color="0.25", linewidth=0.6)
-    ax.set_xlabel(f"share of the variance of {quantity_label(name)}")
+    what = quantity_label(name)
+    ax.set_xlabel(f"share of the variance{' ' if len(what) < 20 else chr(10)}of {what}")  # a narrow figure has no more
     above(ax, handles)
     return ax
 

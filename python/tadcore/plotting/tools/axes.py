@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,19 +14,52 @@ from .style import COLUMN, PAGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
 _WIDTH = 0.825  # of the figure, that a legend above may take
+_for_files: ContextVar[bool] = ContextVar("_for_files", default=False)
+
+
+@contextmanager
+def for_files() -> Iterator[None]:
+    """Figures made in the block are for files only: they need no display, whatever backend the user has chosen.
+
+    They are unknown to pyplot, so none has to be closed, and the user's backend is neither loaded nor changed.
+    """
+    before = _for_files.set(True)
+    try:
+        yield
+    finally:
+        _for_files.reset(before)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A new figure of this size in inches: one of pyplot's, or where it is `for_files` one of nobody's."""
+    if not _for_files.get():
+        import matplotlib.pyplot as plt
+
+        return plt.figure(figsize=(width, height), layout="constrained")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def root_figure(ax: Axes) -> Figure:
+    """The figure that the axes are in, and not a part of it."""
+    part: Any = ax.get_figure()
+    root: Figure = part.figure
+    return root
 
 
 def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
     """Return ``ax``, or the axes of a new figure of this size in inches."""
     if ax is not None:
         return ax
-    import matplotlib.pyplot as plt
-
-    figure = plt.figure(figsize=(width, height), layout="constrained")
-    return figure.add_subplot(projection=projection)
+    return new_figure(width, height).add_subplot(projection=projection)
 
 
 def new_panels(
@@ -35,13 +70,11 @@ def new_panels(
     The figure is one column wide, two from ``page_from`` panels in a row on. Its height in inches is ``rest`` and
     ``row`` for each row of panels; with ``square`` a row is as much higher as its panels are wide.
     """
-    import matplotlib.pyplot as plt
-
     columns = max(min(columns, count), 1)
     rows = max(-(-count // columns), 1)
     width = PAGE if columns >= page_from else COLUMN
     height = rest + rows * (row + (width / columns if square else 0.0))
-    figure = plt.figure(figsize=(width, height), layout="constrained")
+    figure = new_figure(width, height)
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **options), dtype=object)
 
 
@@ -56,8 +89,7 @@ def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **opt
         "handletextpad": 0.4,
         "borderaxespad": 0.2,
     }
-    most, figure = columns or len(handles), ax.get_figure(root=True)
-    assert figure is not None
+    most, figure = columns or len(handles), root_figure(ax)
     place = ax.get_subplotspec()
     share = len(place.colspan) / place.get_gridspec().ncols if place is not None else 1.0
     for rows in range(-(-len(handles) // most), len(handles) + 1):

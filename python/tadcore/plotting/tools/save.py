@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
-from tadcore._shared.files import written
+from tadcore._shared.files import as_path, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +53,7 @@ def save(
     settings: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.hashsalt": "tadcore"}
     if "pgf" in formats:
         settings |= {"pgf.texsystem": _engine(), "pgf.preamble": r"\usepackage{amssymb}", "pgf.rcfonts": False}
-    base = Path(stem)
+    base = as_path("stem", stem)
     base.parent.mkdir(parents=True, exist_ok=True)
     files = []
     with mpl.rc_context(settings):

@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import MISSING, ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
@@ -126,6 +127,7 @@ def theta_bound(
     True
     """
     require_clarabel()
+    as_scenario(sc)
     seen = as_adjacency(adjacency, (len(sc.constrained), sc.n + 1))
     k = as_index("step", step, sc.steps)
     m = matrices_of(sc)

@@ -10,7 +10,7 @@ from tadcore.verification.checks.steps import refined
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution
-from tadcore.verification.report import Check, Measurement, VerificationReport, number
+from tadcore.verification.report import Check, Claim, Measurement, VerificationReport, number
 
 _IDENTITY = 1e-10
 _REMEDY = "the values P(t) do not belong to this game, or the step is too long for the quadrature (‖C‖δ > 1)"
@@ -47,20 +47,18 @@ def check_nafne(
     checks, notes, measured = [], [], []
     for index in adapted.index(sampled=False):
         name = f"nafne.value.{index.party}"
-        checks.append(
-            Check(name, index.error, _IDENTITY, index.converged, _REMEDY, theorem, f"V(0) = {number(index.initial)}")
-        )
+        claim = Claim(name, _IDENTITY, _REMEDY, theorem)
+        where = f"V(0) = {number(index.initial)}"
+        checks.append(claim.judge(index.error, where, doubt=index.doubt, converged=index.converged))
     for index in adapted.index(sampled=True):
         name = f"nafne.as_played.{index.party}"
         gap = index.value - index.initial
-        checks.append(
-            Check(
-                name, index.error, _IDENTITY, index.converged, _REMEDY, identity, f"J^Ad - V(0) = {number(gap, '.3g')}"
-            )
-        )
+        claim = Claim(name, _IDENTITY, _REMEDY, identity)
+        where = f"J^Ad - V(0) = {number(gap, '.3g')}"
+        checks.append(claim.judge(index.error, where, doubt=index.doubt, converged=index.converged))
         measured.append(Measurement(f"nafne.gap.{index.party}", gap, "J^Ad as played minus V(0): frozen feedback"))
     for player, label in enumerate(run.scenario.players):
-        largest, gain, resolved = 0.0, -np.inf, True
+        largest, gain, resolved, doubt = 0.0, -np.inf, True, 0.0
         party, sign = adapted.party_of(player)
         for draw in range(deviations):
             rng = generator(seed, player * 2**32 + draw)
@@ -71,12 +69,15 @@ def check_nafne(
             index = adapted.index(sampled=False, deviation=deviation)[party]
             largest = float(np.maximum(largest, index.error))  # nan stays
             resolved &= index.converged
+            doubt = max(doubt, index.doubt)
             gain = float(np.maximum(gain, -sign * (index.value - index.initial) / max(index.scale, 1e-300)))
         else:
             if deviations:
-                checks.append(Check(f"nafne.deviation.{label}", largest, _IDENTITY, resolved, _REMEDY, identity))
+                claim = Claim(f"nafne.deviation.{label}", _IDENTITY, _REMEDY, identity)
+                checks.append(claim.judge(largest, doubt=doubt, converged=resolved))
                 remedy = f"{label} gains by deviating: the strategies are no equilibrium for J^Ad"
-                checks.append(Check(f"nafne.gain.{label}", gain, _IDENTITY, resolved, remedy, theorem))
+                claim = Claim(f"nafne.gain.{label}", _IDENTITY, remedy, theorem)
+                checks.append(claim.judge(gain, doubt=doubt, converged=resolved))
     for name, size in _sizes(adapted).items():
         measured.append(Measurement(f"nafne.{name}", size, "largest Frobenius norm along the run, reduced"))
     return VerificationReport("network-adapted equilibrium", tuple(checks), tuple(measured), tuple(notes))

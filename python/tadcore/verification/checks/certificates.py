@@ -6,30 +6,25 @@ import dataclasses
 
 import numpy as np
 
-from tadcore._shared.arrays import Floats
 from tadcore.errors import TadcoreError
 from tadcore.game.synthesis import synthesize
 from tadcore.simulation.run import Run, simulate
-from tadcore.verification.oracle.matrices import Matrices
-from tadcore.verification.oracle.optimality import optimality
+from tadcore.verification.oracle.optimality import CRITICAL, Optimality
 from tadcore.verification.report import Check
 
 from .claims import RECORD
 from .ending import TINY
 
-_GRADIENT = 1e-9
 _EDGE = 1e-9
 """Relative eigenvalue within which rounding decides whether a form is positive semidefinite."""
 
 
-def check_certified(run: Run, m: Matrices, values: Floats) -> Check:
+def check_certified(run: Run, found: Optimality) -> Check:
     """By how many rows the recorded number of proofs is off, beyond those that rounding decides."""
-    found = optimality(run.scenario, m, values, run.adjacency, run.gains)
-    critical = found.gradient <= _GRADIENT
     unknown = np.isnan(found.certificate)
     blind = ~run.adjacency.any(axis=(1, 2))  # nothing to choose: proved
-    proved = int(np.sum((critical & (found.certificate > _EDGE)) | blind))
-    possible = int(np.sum(critical & (unknown | (found.certificate >= -_EDGE))))
+    proved = int(np.sum(((found.gradient <= CRITICAL) & (found.certificate > _EDGE)) | blind))
+    possible = int(np.sum(unknown | (found.certificate >= -_EDGE)))
     off = max(proved - run.certified, run.certified - possible, 0)
     between = f"{proved}" if proved == possible else f"{proved} to {possible}"
     detail = f"{run.certified} recorded, {between} of {len(run.times)} found"

@@ -92,7 +92,8 @@ def check_consistency(run: Run, equilibrium: FeedbackSolution) -> VerificationRe
     if len(full):
         z = run.position[full, :-1] - run.position[full, -1:]
         expected = own[full] @ z
-        size = scale * max(float(np.abs(z).max()), 1e-300)
+        rounded = 4.0 * float(np.finfo(np.float64).eps) / _ROWS * float(np.abs(run.position).max())
+        size = scale * max(float(np.abs(z).max()) + rounded, 1e-300)
         off = float(np.abs(run.gains[full] - own[full]).max()) / scale
         control = float(np.abs(run.control[full, :m] - expected).max()) / size
         where = f"{len(full)} of {length} instants"

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
@@ -35,6 +36,8 @@ _OPTIMUM = 1e-8
 _SILENT = 1e-10
 _SHOWN = 3
 _LEAP_STEPS = 30
+_FIVE = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+_THROUGH_FIVE = np.linalg.inv(np.vander(_FIVE, increasing=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,10 +159,9 @@ class _Player:
 
 def _lowest(value: Callable[[float], float]) -> float:
     """The minimiser along a line of a polynomial of degree four, from five values; 0 where nothing is lower."""
-    at = np.array([0.0, 0.5, 1.0, 1.5, 2.0])
-    values = np.array([value(float(t)) for t in at])
-    quartic = np.polynomial.Polynomial.fit(at, values, 4).convert()
-    roots = quartic.deriv().roots()
+    quartic = _THROUGH_FIVE @ [value(1.0 + float(s)) for s in _FIVE]  # in t - 1, where the minimum of most lies
+    slope = quartic[1:] * np.arange(1.0, 5.0)
+    roots = 1.0 + np.roots(slope[::-1]) if np.isfinite(slope).all() else np.zeros(0)
     real = roots[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))].real
     real = real[real > 0.0]
     if not len(real):
@@ -174,7 +176,7 @@ def decentralise(
     adjacency: ArrayLike | VisibilityNetwork,
     method: Literal["newton", "gradient"] = "newton",
     delay: int = 0,
-    max_rounds: int = 5000,
+    max_rounds: int = 1000,
 ) -> Decentralised:
     """Let the players find their gains at one instant by exchanging rows.
 
@@ -206,6 +208,7 @@ def decentralise(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
+    as_scenario(sc)
     seen = as_adjacency(adjacency, (len(sc.constrained), sc.n + 1))
     k = as_index("step", step, sc.steps)
     delay = as_index("delay", delay, 1000)

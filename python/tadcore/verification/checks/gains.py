@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
 from tadcore.scenario.model import Scenario
@@ -25,10 +26,10 @@ from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_c
 from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
-from tadcore.verification.oracle.optimality import optimality
+from tadcore.verification.oracle.optimality import CRITICAL, optimality
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
-_GRADIENT, _CURVATURE, _LOWER, _BELOW = 1e-9, 1e-9, 1e-8, 1e-10
+_CURVATURE, _LOWER, _BELOW = 1e-9, 1e-8, 1e-10
 _DENSE = 400
 
 
@@ -108,7 +109,7 @@ def check_gains(
     steepest = float(slopes[at])
     remedy = "the gains are not critical points of Θ: they are not what the synthesis gives"
     where = f"t = {run.times[at]:.6g}"
-    checks.append(Check("gains.gradient", steepest, _GRADIENT, True, remedy, "eq:errgradient", where))
+    checks.append(Check("gains.gradient", steepest, CRITICAL, True, remedy, "eq:errgradient", where))
 
     chosen = _instants(run, instants)
     flattest, lower, worst, where_lower = np.inf, 0.0, 0.0, 0
@@ -220,6 +221,7 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
     CertificateRates
         The counts.
     """
+    as_scenario(sc)
     m = matrices_of(sc)
     values = m.values(solve_equilibrium(sc).P)
     shape = (len(sc.constrained), sc.n + 1)

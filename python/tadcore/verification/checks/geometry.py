@@ -14,10 +14,13 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
+from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.oracle.draws import generator
-from tadcore.verification.report import Check, VerificationReport
+from tadcore.verification.oracle.frozen import frozen_steps
+from tadcore.verification.oracle.matrices import matrices_of, stacked_rows
+from tadcore.verification.report import Check, Claim, VerificationReport
 
 _LINE, _SAME, _DECIDED = 1e-10, 1e-8, 1e-11
 
@@ -127,10 +130,12 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
         rounding decides is not converged.
     """
     sc = run.scenario
+    rounded = _rounding(run, float(np.abs(run.position).max()))
     checks, notes = [], []
     if sc.interaction == "I1" and sc.attacker.evasion == 0.0:
         remedy = "a suicidal attacker and its target must stay on their line: P_τ or P_a reaches beyond the target"
-        checks.append(Check("geometry.line", off_the_line(run), _LINE, True, remedy, "thm:straight_line"))
+        claim = Claim("geometry.line", _LINE, remedy, "thm:straight_line")
+        checks.append(claim.judge(off_the_line(run), doubt=rounded))
     compared, differing = 0, 0
     apart = np.linalg.norm(sc.positions[:, None] - sc.positions, axis=-1)
     for i, player in enumerate(sc.constrained):
@@ -147,7 +152,7 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
     else:
         notes.append("everyone with limited sight starts within a capture radius of someone: no radius to delay")
 
-    decided = _margin(run) > _DECIDED
+    margin = _margin(run)
     rng = generator(seed, 2**40)
     turn = np.linalg.qr(rng.normal(size=(sc.dim, sc.dim)))[0]
     turn[:, 0] *= np.sign(np.linalg.det(turn))
@@ -157,16 +162,40 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
     remedy = "the result depends on the frame: report this scenario"
     for name, U, by in (("rotation", turn, none), ("reflection", mirror, none), ("translation", still, shift)):
         other_run = simulate(moved(sc, U, by))
-        gap = unlike(run, other_run, run.position @ U.T + by, run.outcome.defender)
-        checks.append(Check(f"geometry.{name}", gap, _SAME, decided or gap <= _SAME, remedy, "eq:stateequation"))
+        expected = run.position @ U.T + by
+        gap = unlike(run, other_run, expected, run.outcome.defender)
+        doubt = _rounding(run, float(np.abs(expected).max()))
+        claim = Claim(f"geometry.{name}", _SAME, remedy, "eq:stateequation")
+        checks.append(claim.judge(gap, doubt=doubt if margin > max(_DECIDED, doubt) else np.inf))
     if sc.n > 1:
         order = list(range(sc.n))[::-1]
         other_run = simulate(relabelled(sc, order))
         winner = None if run.outcome.defender is None else order.index(run.outcome.defender)
         gap = unlike(run, other_run, run.position[:, [*order, sc.n, sc.n + 1]], winner)
         remedy = "the result depends on the order of the defenders: the synthesis found different minima"
-        checks.append(Check("geometry.relabelling", gap, _SAME, decided or gap <= _SAME, remedy, "eq:optproblem"))
+        claim = Claim("geometry.relabelling", _SAME, remedy, "eq:optproblem")
+        checks.append(claim.judge(gap, doubt=rounded if margin > max(_DECIDED, rounded) else np.inf))
     return VerificationReport("geometry", tuple(checks), notes=tuple(notes))
+
+
+def _rounding(run: Run, reach: float) -> float:
+    """What rounding positions as far out as ``reach`` makes of a run, relative to its extent.
+
+    Every step rounds the state; the steps that follow carry it on.
+    """
+    sc, m = run.scenario, matrices_of(run.scenario)
+    rows = stacked_rows(solve_equilibrium(sc).feedback, sc.players)[: len(run.times)]
+    rows[:, : run.gains.shape[1]] = run.gains
+    with np.errstate(over="ignore", invalid="ignore"):
+        transition, _ = frozen_steps(m.B @ rows[:-1], sc.horizon / sc.steps)
+        carried, grown = np.eye(m.size), 1.0
+        for step in transition:
+            carried = step @ carried
+            grown = max(grown, float(np.abs(carried).sum(axis=1).max()))
+    at = run.position
+    extent = max(float(np.abs(at - at.mean(axis=1, keepdims=True)).max()), 1e-300)
+    found = 16.0 * float(np.finfo(np.float64).eps) * (1.0 + reach / extent) * grown
+    return found if np.isfinite(found) else np.inf
 
 
 def _margin(run: Run) -> float:

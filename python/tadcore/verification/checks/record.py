@@ -10,6 +10,7 @@ import numpy as np
 
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, stacked_rows
+from tadcore.verification.oracle.optimality import optimality
 from tadcore.verification.report import VerificationReport
 
 from .arrays import check_arrays
@@ -47,6 +48,7 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows decides nothing
         if length > 1:
             checks += [*check_motion(run, m, rows), check_control(run, rows), check_theta(run, m, values)]
-        checks += [check_costs(run, m, rows), check_last_row(run, m, values, rows)]
-        checks += [check_certified(run, m, values), check_synthesis(run)]
+        found = optimality(run.scenario, m, values, run.adjacency, run.gains)
+        checks += [check_costs(run, m, rows), check_last_row(run, m, values, rows, found)]
+        checks += [check_certified(run, found), check_synthesis(run)]
     return VerificationReport("record", tuple(checks))

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import as_index
 from tadcore.game.chattering import Chatter, chatter
+from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import Outcome
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.batch import simulate_batch
@@ -85,6 +86,7 @@ class Refinement:
 
 def refined(sc: Scenario, halvings: int, *, least: int = 0) -> list[Scenario]:
     """The scenario at δ, δ/2, δ/4, …: ``halvings`` + 1 of them."""
+    as_scenario(sc)
     count = as_index("halvings", halvings, 20, least=least)
     return [sc, *(sc.replace(step=sc.horizon / (sc.steps * 2**i)) for i in range(1, count + 1))]
 

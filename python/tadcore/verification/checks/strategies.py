@@ -10,14 +10,13 @@ from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.indices import adapted_weights, theta_terms
 from tadcore.verification.oracle.matrices import Matrices
-from tadcore.verification.oracle.optimality import optimality
+from tadcore.verification.oracle.optimality import CRITICAL, Optimality
 from tadcore.verification.report import Check
 
 from .claims import RECORD
 from .ending import TINY, distances
 
 _EPS = float(np.finfo(np.float64).eps)
-_GRADIENT = 1e-9
 
 
 def check_network(run: Run) -> Check:
@@ -57,14 +56,14 @@ def check_admissible(run: Run) -> Check:
 
 
 def unseen(gains: Floats, adjacency: NDArray[np.bool_]) -> Floats:
-    """For every row (rows, m) the largest part outside the row space of 𝓘_i, relative to its largest gain."""
+    """For every row (rows, m) the largest part outside the row space of 𝓘_i, relative to the largest gain of all."""
     each = np.arange(gains.shape[1])
     foreign = np.where(adjacency, 0.0, np.abs(gains))
     foreign[:, each, each] = 0.0
     sees_attacker = adjacency[:, each, each]
     total = np.where(sees_attacker, 0.0, np.abs(gains.sum(axis=2)))  # else only differences z_j - z_i
     worst = np.maximum(foreign.max(axis=2), total)
-    largest = np.abs(gains).max(axis=2)
+    largest = np.broadcast_to(np.abs(gains).max(axis=(1, 2))[:, None], worst.shape)
     return np.asarray(np.divide(worst, largest, out=np.zeros_like(worst), where=largest > 0.0))
 
 
@@ -103,19 +102,21 @@ def check_theta(run: Run, m: Matrices, values: Floats) -> Check:
     return RECORD["record.theta"].judge(float(off[k]), f"t = {run.times[k]:.6g}")
 
 
-def check_last_row(run: Run, m: Matrices, values: Floats, rows: Floats) -> Check:
-    """The terminal row: the largest error of anything in it, each relative to what is accepted of it."""
+def check_last_row(run: Run, m: Matrices, values: Floats, rows: Floats, found: Optimality) -> Check:
+    """The terminal row: the largest error of anything in it, each relative to what is accepted of it.
+
+    Gains are accepted that are as critical as those of the rows before: ``gains.gradient`` says how critical these are.
+    """
     last = slice(len(run.times) - 1, None)
     network, gains = run.adjacency[last], run.gains[last]
     if len(run.times) > 1:
         changed = float((network[0] != run.adjacency[-2]).any())
     else:
         changed = float(network_errors(run.scenario, run.position[last], network).max())
-    found = optimality(run.scenario, m, values[:, last], network, gains)
     parts = {
         "network": changed / RECORD["record.network"].bound,
         "gains beyond sight": float(unseen(gains, network).max()) / RECORD["record.admissible"].bound,
-        "gains": float(found.gradient[0]) / _GRADIENT,
+        "gains": float(found.gradient[-1]) / max(CRITICAL, 10.0 * float(found.gradient[:-1].max(initial=0.0))),
         "Θ": float(theta_errors(run, m, values, last)[0]) / RECORD["record.theta"].bound,
         "controls": float(control_errors(run, rows, last).max()) / RECORD["record.control"].bound,
     }

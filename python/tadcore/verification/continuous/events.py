@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 
 from tadcore import _core
 from tadcore._shared.arrays import Floats
+from tadcore.game.compiled import as_scenario
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
 from tadcore.scenario.model import Scenario
@@ -60,7 +61,7 @@ def play_by_events(sc: Scenario) -> EventPlay:
     >>> play.outcome.kind, round(play.outcome.time, 3)
     ('intercepted', 1.393)
     """
-    return _Play(sc).run()
+    return _Play(as_scenario(sc)).run()
 
 
 class _Play:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.shares import share
 from tadcore.game.network import Edge
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run, simulate
@@ -64,14 +65,15 @@ class SlidingStudy:
             lines.append(f"  δ = {step:<10.6g} ends at {end:.6g}")
         for s, slide in enumerate(self.play.slides):
             names = ", ".join("→".join(edge) for edge in slide.edges)
-            lines.append(f"  {names}: slides from {slide.start:.6g} to {slide.end:.6g}, there {slide.share:.4f} of it")
+            there = share(slide.share)
+            lines.append(f"  {names}: slides from {slide.start:.6g} to {slide.end:.6g}, there {there} of it")
             for c, step in enumerate(self.steps):
                 if np.isnan(self.flips[s, c]):
                     lines.append(f"    δ = {step:<10.6g} no chattering then")
                     continue
                 lines.append(
                     f"    δ = {step:<10.6g} {self.flips[s, c]:.0f} flips from {self.start[s, c]:.6g} to "
-                    f"{self.end[s, c]:.6g}, there {self.share[s, c]:.4f} of it, within {self.drift[s, c]:.2g} of ζ"
+                    f"{self.end[s, c]:.6g}, there {share(self.share[s, c])} of it, within {self.drift[s, c]:.2g} of ζ"
                 )
         return "\n".join(lines)
 

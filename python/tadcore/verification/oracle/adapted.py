@@ -38,6 +38,9 @@ from .indices import AdaptedWeights, adapted_weights, integrands
 from .matrices import FeedbackSolution, Matrices, matrices_of
 
 _PIECES = 64
+_WHOLE = 1e-7
+"""How far the quadrature may be off where ‖C‖δ = 1, a hundred times what was seen: P varies faster than the state."""
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,8 @@ class Index:
         ½∫|integrand| and the terminal term: what rounding is relative to.
     converged : bool
         Whether the steps are short enough for the quadrature, ‖C‖δ ≤ 1 throughout, and nothing overflows.
+    doubt : float
+        How far the quadrature may be off, relative to `scale`.
     """
 
     party: str
@@ -66,6 +71,7 @@ class Index:
     deviation: float
     scale: float
     converged: bool
+    doubt: float
 
     @property
     def error(self) -> float:
@@ -191,12 +197,12 @@ class Adapted:
         nodes, ends = propagate(loop, self.steps, start, self.step)
         return nodes.reshape(self.steps, q, size, dim), ends[:: self.pieces].reshape(self.length + 1, size, dim)
 
-    def _resolved(self, rows: Floats, deviation: Deviation | None) -> bool:
-        """Whether ‖C‖δ ≤ 1: collocation of order 10 then errs by less than 1e-12 on a step."""
+    def _fastest(self, rows: Floats, deviation: Deviation | None) -> float:
+        """‖C‖δ of the stiffest piece."""
         largest = np.abs(self.m.B @ rows).sum(axis=-1).max(axis=(1, 2))
         if deviation is not None:
             largest = largest + np.repeat(np.abs(deviation.gain).sum(axis=(2, 3)).max(axis=1), self.pieces)
-        return float(largest.max()) * self.step <= 1.0
+        return float(largest.max()) * self.step
 
     def index(self, *, sampled: bool, deviation: Deviation | None = None) -> tuple[Index, ...]:
         """J^Ad and the right side of its identity for one play.
@@ -226,7 +232,9 @@ class Adapted:
         zero_sum = self.sc.interaction == "I2"
         value_of = self.grid[1:] if zero_sum else self.grid
         size = self.m.r * np.sum(off * off, axis=-1)
-        resolved = self._resolved(rows, deviation)
+        fastest = self._fastest(rows, deviation)
+        # of order 10; rounding is what remains at the pieces that are aimed at
+        doubt = max(_WHOLE * fastest**10, _ROUNDING)
         found = []
         for p, twice in enumerate(inside):
             name = self.m.parties[p]
@@ -244,7 +252,7 @@ class Adapted:
             value = last + 0.5 * integral(twice, self.step)
             deviated = 0.5 * integral(right, self.step)
             finite = bool(np.isfinite([value, first, deviated, scale]).all())  # what overflows decides nothing
-            found.append(Index(name, value, first, deviated, scale, resolved and finite))
+            found.append(Index(name, value, first, deviated, scale, fastest <= 1.0 and finite, doubt))
         return tuple(found)
 
     def party_of(self, player: int) -> tuple[int, float]:

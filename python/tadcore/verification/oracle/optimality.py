@@ -19,6 +19,8 @@ from tadcore.scenario.model import Scenario
 from .indices import adapted_weights
 from .matrices import Matrices
 
+CRITICAL = 1e-9
+"""The largest gradient, relative to what cancels in it, of gains that count as critical."""
 _CHUNK_BYTES = 64 * 2**20
 _MOST_WORK = 2e10
 """Multiplications that the eigenvalues may take: a few seconds."""
@@ -33,8 +35,9 @@ class Optimality:
     gradient : ndarray, shape (rows,)
         Norm of the gradient of Θ, relative to the products that cancel in it; 0 where nobody sees anyone.
     certificate : ndarray, shape (rows,)
-        Smallest eigenvalue of the certificate's form over the largest absolute one; 0 where nobody sees anyone, nan
-        where the form is too large to be decomposed in reasonable time.
+        Smallest eigenvalue of the certificate's form, relative to the largest absolute one or to what cancels in the
+        form, whichever is larger; 0 where nobody sees anyone, nan where the form is too large to be decomposed in
+        reasonable time.
     """
 
     gradient: Floats
@@ -56,11 +59,11 @@ def optimality(sc: Scenario, m: Matrices, values: Floats, adjacency: NDArray[np.
         members = np.flatnonzero(which == network)
         for first in range(0, len(members), chunk):
             part = members[first : first + chunk]
-            slope, scale, form = _derivatives(sc, m, values[:, part], gains[part])
+            slope, scale, form, cancels = _derivatives(sc, m, values[:, part], gains[part])
             slope = slope.reshape(len(part), -1) @ basis.T
             norm = np.linalg.norm(slope, axis=1)
             gradient[part] = np.where(norm > 0.0, norm / np.maximum(scale, 1e-300), 0.0)
-            certificate[part] = _lowest(basis @ form @ basis.T) if work <= _MOST_WORK else np.nan
+            certificate[part] = _lowest(basis @ form @ basis.T, cancels) if work <= _MOST_WORK else np.nan
     return Optimality(gradient, certificate)
 
 
@@ -75,8 +78,8 @@ def _unknowns(sees: NDArray[np.bool_]) -> Floats:
     return basis.reshape(len(seen), sees.size)
 
 
-def _derivatives(sc: Scenario, m: Matrices, values: Floats, G: Floats) -> tuple[Floats, Floats, Floats]:
-    """The gradient in the joint rows, the size of what cancels in it, and the certificate's form, (rows, mN, mN)."""
+def _derivatives(sc: Scenario, m: Matrices, values: Floats, G: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """The gradient in the joint rows and the certificate's form, (rows, mN, mN), each with the size of what cancels."""
     rows, limited, size = G.shape
     first = sc.interaction == "I1"
     gamma = np.array(sc.synthesis_weights)
@@ -103,14 +106,15 @@ def _derivatives(sc: Scenario, m: Matrices, values: Floats, G: Floats) -> tuple[
         gram = BP @ np.swapaxes(BP, 1, 2)
         form[:, :, axes, :, axes] += 4.0 * g * gram
         form += 4.0 * g * np.einsum("kib,kja->kiajb", BP, BP)
-    return slope, scale, form.reshape(rows, limited * size, limited * size)
+    shape = (rows, limited * size, limited * size)
+    return slope, scale, form.reshape(shape), 4.0 * gamma[0] * float(r.max()) * squares
 
 
-def _lowest(form: Floats) -> Floats:
-    """The smallest eigenvalue over the largest absolute one; nan where the form overflows."""
+def _lowest(form: Floats, cancels: Floats) -> Floats:
+    """The smallest eigenvalue over the largest absolute one or what cancels; nan where the form overflows."""
     found = np.full(len(form), np.nan)
     finite = np.isfinite(form).all(axis=(1, 2))
     spectrum = np.linalg.eigvalsh(form[finite])
-    largest = np.abs(spectrum).max(axis=1)
+    largest = np.maximum(np.abs(spectrum).max(axis=1), cancels[finite])
     found[finite] = np.divide(spectrum[:, 0], largest, out=np.zeros(len(spectrum)), where=largest > 0.0)
     return found

@@ -223,6 +223,14 @@ impl Policy {
         saved::write(&self.transitions, &self.game, cancel)
     }
 
+    /// The bytes of the saved table that begins with these, so that its size is known before it is read.
+    ///
+    /// # Errors
+    /// [`TableError`] for a beginning of no table, or of one that cannot be this game's.
+    pub fn transitions_length(&self, start: &[u8]) -> Result<u64, TableError> {
+        saved::length(start, &self.game, self.budget.capacity())
+    }
+
     /// Adds the entries of a saved table, as far as the budget goes; says how many there are now.
     ///
     /// # Errors
@@ -230,7 +238,7 @@ impl Policy {
     /// when there is no memory for what they hold, or `cancel` was raised.
     pub fn load_transitions(&self, bytes: &[u8], cancel: &CancelToken) -> Result<usize, TableError> {
         let (rows, size) = (self.game.constrained(), self.game.size());
-        saved::read(bytes, &self.game, cancel, |step, key, matrix| {
+        saved::read(bytes, &self.game, self.budget.capacity(), cancel, |step, key, matrix| {
             let canonical =
                 self.classes.any().then(|| self.classes.canonical(&Topology::from_words(rows, size, key)).0);
             self.transitions.keep(step, key, canonical.as_ref().map(Topology::words), matrix, &self.budget);

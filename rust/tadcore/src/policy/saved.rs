@@ -118,38 +118,55 @@ pub(super) fn write(transitions: &Transitions, game: &Game, cancel: &CancelToken
     Ok(out)
 }
 
-/// Hands the entries of a saved table to `each`: step, key and padded matrix.
+/// The bytes of the table that begins with these, of a game whose tables hold at most `capacity` bytes.
 ///
 /// # Errors
-/// [`TableError`] for bytes that are no table, or one of another game, version or format; no entry is handed over then.
-pub(super) fn read(
-    bytes: &[u8],
-    game: &Game,
-    cancel: &CancelToken,
-    mut each: impl FnMut(usize, &[u64], &[f64]),
-) -> Result<(), TableError> {
+/// [`TableError`] for a beginning of no table, or of one of another game, format or size: what follows need not be read.
+pub(super) fn length(start: &[u8], game: &Game, capacity: usize) -> Result<u64, TableError> {
     let shape = Shape::of(game);
-    if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
+    if start.len() < HEADER || &start[..8] != MAGIC {
         return Err(TableError::Foreign);
     }
-    let mut reader = Reader(&bytes[8..]);
+    let mut reader = Reader(&start[8..]);
     let format = reader.u32();
     if format != FORMAT {
         return Err(TableError::Format { found: format, expected: FORMAT });
     }
     let numbers = [reader.u32(), reader.u32(), reader.u32()];
     let (identity, count) = (reader.u64(), reader.u64());
+    if numbers != shape.numbers() || identity != shape.identity.len() as u64 {
+        return Err(TableError::OtherGame);
+    }
+    // In memory an entry takes more than here.
+    let most = capacity / shape.entry;
+    if count > most as u64 {
+        return Err(TableError::TooMany { found: count, most });
+    }
+    Ok(HEADER as u64 + identity + count * shape.entry as u64 + 8)
+}
+
+/// Hands the entries of a saved table of at most `capacity` bytes to `each`: step, key and padded matrix.
+///
+/// # Errors
+/// [`TableError`] for bytes that are no table, or one of another game, version or format; no entry is handed over then.
+pub(super) fn read(
+    bytes: &[u8],
+    game: &Game,
+    capacity: usize,
+    cancel: &CancelToken,
+    mut each: impl FnMut(usize, &[u64], &[f64]),
+) -> Result<(), TableError> {
+    if length(bytes, game, capacity)? != bytes.len() as u64 {
+        return Err(TableError::Damaged);
+    }
+    let shape = Shape::of(game);
     let (data, sum) = bytes.split_at(bytes.len() - 8);
     if Reader(sum).u64() != checksum(data) {
         return Err(TableError::Damaged);
     }
-    let other = numbers != shape.numbers() || identity != shape.identity.len() as u64;
-    let Some(body) = data[HEADER..].strip_prefix(&shape.identity[..]).filter(|_| !other) else {
+    let Some(body) = data[HEADER..].strip_prefix(&shape.identity[..]) else {
         return Err(TableError::OtherGame);
     };
-    if count.checked_mul(shape.entry as u64) != Some(body.len() as u64) {
-        return Err(TableError::Damaged);
-    }
     // Nothing is handed over before all of it is known to be sound.
     for entries in body.chunks(POLL.next_multiple_of(shape.entry)) {
         cancel.check()?;

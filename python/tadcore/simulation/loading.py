@@ -1,0 +1,114 @@
+"""A run read back from the files that `tadcore.Run.save` wrote."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from pydantic import ValidationError
+
+from tadcore._shared.files import as_path, strange
+from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
+
+from .files import RECORD, SEAL, VARIABLES, fields_of, seal
+from .run import Run
+
+_RULE = "a run that Run.save wrote: a folder, or a file that ends in .nc"
+
+
+def load_run(path: str | os.PathLike[str]) -> Run:
+    """Read a run that `Run.save` wrote; every number is bitwise the one that was saved.
+
+    Parameters
+    ----------
+    path : path
+        A file that ends in ``.nc``, or the folder with ``run.nc`` in it.
+
+    Returns
+    -------
+    Run
+        The run, with everything that it can do: figures, dataset, verification.
+
+    Raises
+    ------
+    ScenarioError
+        There is no such file, it is no saved run, or it is damaged.
+
+    Examples
+    --------
+    >>> import tadcore, tempfile
+    >>> run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run.save(f"{folder}/run.nc")
+    ...     print(tadcore.load_run(f"{folder}/run.nc").outcome)
+    d1 intercepts the attacker at t = 1.395
+    """
+    place = as_path("path", path)
+    name = os.fspath(path)
+    try:
+        file = place / "run.nc" if place.is_dir() else place
+        found = strange(file)
+        if found is not None:
+            raise ScenarioError(name, found, _RULE)
+        with file.open("rb") as stream:
+            begins = stream.read(3)
+        if begins != b"CDF":
+            raise ScenarioError(name, "a file of another kind", _RULE)
+        with xr.open_dataset(file, engine="scipy", mmap=False) as opened:
+            return _unpacked(opened.load(), name)
+    except OSError as error:
+        raise ScenarioError(name, error.strerror or str(error), _RULE) from None
+    except ScenarioError:
+        raise
+    except Exception as error:  # of the reader of netCDF: whatever damaged bytes lead it to
+        raise ScenarioError(name, "a damaged file", f"{_RULE} ({type(error).__name__}: {error})") from None
+
+
+def _unpacked(data: xr.Dataset, name: str) -> Run:
+    if RECORD not in data.attrs:
+        raise ScenarioError(name, f"no attribute {RECORD!r}", f"{_RULE}; earlier versions did not save all of a run")
+    sc = Scenario.from_toml_string(str(data.attrs["scenario"]), name=name)
+    arrays, others = fields_of(Run)
+    record = json.loads(data.attrs[RECORD])
+    try:
+        rest = {field: adapter.validate_python(record[field]) for field, adapter in others.items() if field in record}
+    except ValidationError as error:
+        raise ValueError(str(error).replace("\n", " ")) from None
+    missing = [field for field in arrays if VARIABLES.get(field, field) not in data]
+    if missing:
+        raise ValueError(f"it has no variable {missing[0]}")
+    values: dict[str, Any] = {field: np.ascontiguousarray(data[VARIABLES.get(field, field)].values) for field in arrays}
+    run = Run(scenario=sc, **values, **rest)
+    _check(run, name)
+    if record.pop(SEAL) != seal(str(data.attrs["scenario"]), record, values.values()):
+        raise ValueError("its content is not what was saved")
+    return run
+
+
+def _check(run: Run, name: str) -> None:
+    """Refuse a record that is not one of its scenario: shapes, types, finite numbers, instants, the player named."""
+    sc, rows = run.scenario, len(run.times)
+    team = (rows, len(sc.constrained), sc.n + 1)
+    shapes = {
+        "times": (rows,),
+        "position": (rows, sc.n + 2, sc.dim),
+        "control": (rows, sc.n + 2, sc.dim),
+        "adjacency": team,
+        "gains": team,
+        "theta": (rows,),
+        "theta_terms": (rows, run.theta_terms.shape[-1]),
+    }
+    for field, shape in shapes.items():
+        array = getattr(run, field)
+        kind = np.dtype(bool) if field == "adjacency" else np.dtype(np.float64)
+        if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
+            raise ScenarioError(f"{name}, {field}", f"{array.dtype} {array.shape}", f"finite {kind} of shape {shape}")
+    if rows == 0 or run.times[0] != 0.0 or (np.diff(run.times) <= 0.0).any():
+        raise ScenarioError(f"{name}, times", run.times, "instants from 0 on, each later than the one before")
+    defender = run.outcome.defender
+    if (defender is not None) != (run.outcome.kind == "intercepted") or not 0 <= (defender or 0) < sc.n:
+        raise ScenarioError(f"{name}, outcome.defender", defender, "the defender that intercepted, None elsewhere")

@@ -1,0 +1,299 @@
+"""Arguments of every kind that is none: taken for what they are, or refused by name, and never a raw error."""
+
+import concurrent.futures
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tadcore
+from tadcore import Scenario, ScenarioError, Study, sampling
+
+SC = tadcore.scenarios.load("paper-i1").replace({"horizon": 0.5, "step": 0.05})
+STARTS = np.stack([SC.positions, SC.positions + 0.25, SC.positions - 0.25])
+EXPECTED = tadcore.simulate_batch(SC, STARTS)
+
+
+class Broken:
+    """Says that it is an array, and is none; does not even tell what it is."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("no")
+
+    def __repr__(self):
+        raise RuntimeError("no")
+
+
+def misaligned(array):
+    buffer = np.zeros(array.nbytes + 1, dtype=np.uint8)
+    view = buffer[1:].view(array.dtype).reshape(array.shape)
+    view[...] = array
+    assert not view.flags.aligned
+    return view
+
+
+def frozen(array):
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+SAME = {
+    "lists": STARTS.tolist(),
+    "tuples": tuple(map(tuple, (map(tuple, game) for game in STARTS.tolist()))),
+    "a list of arrays": list(STARTS),
+    "big-endian": STARTS.astype(">f8"),
+    "in Fortran's order": np.asfortranarray(STARTS),
+    "every second": np.repeat(STARTS, 2, axis=0)[::2],
+    "backwards": STARTS[::-1, ::-1, ::-1].copy()[::-1, ::-1, ::-1],
+    "read-only": frozen(STARTS),
+    "misaligned": misaligned(STARTS),
+    "misaligned, big-endian": misaligned(STARTS.astype(">f8")),
+    "long doubles": STARTS.astype(np.longdouble),
+    "xarray": xr.DataArray(STARTS),
+    "pandas": [pd.DataFrame(game) for game in STARTS],
+    "nothing masked": np.ma.masked_array(STARTS, mask=False),
+    "nothing masked, in a list": [np.ma.masked_array(game) for game in STARTS],
+    "matrices": [np.asmatrix(game) for game in STARTS],
+    "a memory view": memoryview(STARTS),
+}
+
+
+@pytest.mark.parametrize("given", SAME.values(), ids=SAME.keys())
+def test_an_array_is_what_it_holds(given):
+    found = tadcore.simulate_batch(SC, given, visibility_radii=np.asarray(SC.visibility_radii, dtype=">f4"))
+    np.testing.assert_array_equal(found.time, EXPECTED.time)
+    np.testing.assert_array_equal(found.defender, EXPECTED.defender)
+
+
+HOLED = np.ma.masked_array(STARTS, mask=False)
+HOLED[1, 2, 0] = np.ma.masked
+NONE = {
+    "None": None,
+    "a number": 5.0,
+    "a string": "positions",
+    "bytes": b"positions",
+    "a generator": (game for game in STARTS),
+    "a set": {1.0, 2.0},
+    "a dict": {"d1": [0.0, 0.0]},
+    "ragged": [[[0.0, 0.0]], [[0.0]]],
+    "objects": STARTS.astype(object),
+    "complex": STARTS.astype(complex),
+    "booleans": STARTS > 0,
+    "strings": STARTS.astype(str),
+    "dates": STARTS.astype("M8[s]"),
+    "fields": np.zeros(3, dtype=[("x", float)]),
+    "0-d": np.array(1.0),
+    "masked": HOLED,
+    "masked in a list": list(HOLED),
+    "masked in lists": [list(game) for game in HOLED],
+    "masked in tuples": [tuple(game) for game in HOLED],
+    "NaN in pandas": [pd.DataFrame(STARTS[0]).mask(pd.DataFrame(STARTS[0]) > 1.5)],
+    "NA in pandas": [pd.DataFrame(STARTS[0]).astype("Float64").mask(pd.DataFrame(STARTS[0]) > 1.5)],
+    "a scenario": SC,
+    "a function": lambda: STARTS,
+    "a class": np.ndarray,
+    "broken": Broken(),
+    "one game": STARTS[0],
+    "a player too many": np.zeros((1, 6, 2)),
+}
+
+
+@pytest.mark.parametrize("given", NONE.values(), ids=NONE.keys())
+def test_what_is_no_array_is_refused_by_name(given):
+    with pytest.raises(ScenarioError, match=r"^positions"):
+        tadcore.simulate_batch(SC, given)
+    for name in ("visibility_radii", "capture_radii"):
+        if given is not None:
+            with pytest.raises(ScenarioError, match=rf"^{name}"):
+                tadcore.simulate_batch(SC, STARTS, **{name: given})
+    with pytest.raises(ScenarioError, match=r"^adjacency"):
+        tadcore.VisibilityNetwork(given)
+    with pytest.raises(ScenarioError, match=r"^adjacency"):
+        tadcore.synthesize(SC, step=0, adjacency=given)
+    if given is not None and given is not NONE["one game"]:
+        with pytest.raises(ScenarioError, match=r"^positions"):
+            tadcore.VisibilityNetwork.from_positions(SC, given)
+    if not isinstance(given, str | bytes):
+        with pytest.raises(ScenarioError):
+            Scenario.model_validate({**SC.model_dump(), "synthesis_weights": given})
+
+
+@pytest.mark.parametrize("mask", [[[0, 1, 0, 0], [0] * 4, [0] * 4], True])
+def test_a_masked_network_is_refused(mask):
+    seen = np.ma.masked_array(np.ones((3, 4)), mask=np.broadcast_to(mask, (3, 4)))
+    for given in (seen, list(seen)):
+        with pytest.raises(ScenarioError, match="adjacency: got 'an array with masked entries'"):
+            tadcore.VisibilityNetwork(given)
+
+
+NOT_A_SCENARIO = [None, 5, "paper-i1", b"x", [], {}, np.zeros(3), SC.model_dump(), SC.attacker, Scenario, Broken()]
+
+
+@pytest.mark.parametrize("given", NOT_A_SCENARIO, ids=lambda given: type(given).__name__)
+def test_what_is_no_scenario_is_refused_by_name(given):
+    everyone = [[1] * 4] * 3
+    uses = [
+        tadcore.simulate,
+        tadcore.solve_equilibrium,
+        tadcore.verify,
+        tadcore.outcome_map,
+        tadcore.VisibilityNetwork.from_positions,
+        lambda sc: tadcore.simulate_batch(sc, STARTS),
+        lambda sc: tadcore.synthesize(sc, step=0, adjacency=everyone),
+        lambda sc: Study(sc, vary={"attacker.position": sampling.Box(-1, 1)}, trials=1),
+        lambda sc: tadcore.radius_curve(sc, STARTS, radii=[1.0]),
+        lambda sc: tadcore.analysis.sensitivity(sc, {"d1.visibility_radius": stats.uniform(1, 2)}),
+        lambda sc: tadcore.verification.step_study(sc),
+        lambda sc: tadcore.verification.play_by_events(sc),
+    ]
+    for use in uses:
+        with pytest.raises(ScenarioError):
+            use(given)
+
+
+ODD = [
+    None,
+    5,
+    1.5,
+    True,
+    b"d1",
+    [],
+    ["d1"],
+    np.array([]),
+    np.array(["d1", "d2"]),
+    {},
+    Broken(),
+    "\ud800",
+    "",
+    "d0",
+    object,
+]
+
+
+@pytest.mark.parametrize("given", ODD, ids=lambda given: type(given).__name__)
+def test_what_is_no_name_is_refused_by_name(given):
+    run, eq = tadcore.simulate(SC), tadcore.solve_equilibrium(SC)
+    for use in (
+        lambda: tadcore.outcome_map(SC, given, x=(0, 1, 2), y=(0, 1, 2)),
+        lambda: tadcore.scenarios.load(given),
+        lambda: tadcore.scenarios.text(given),
+        lambda: tadcore.scenarios.find(given),
+        lambda: eq.full(given, 0),
+        lambda: tadcore.synthesize(SC, step=0, adjacency=[[1] * 4] * 3, method=given),
+        lambda: Study(SC, vary={"attacker.position": sampling.Box(-1, 1)}, trials=1, design=given),
+        lambda: tadcore.radius_curve(SC, STARTS, player=given, radii=[1.0]),
+        lambda: tadcore.radius_curve(SC, STARTS, kind=given, radii=[1.0]),
+        lambda: run.plot.controls(axis=given) if given is not None else tadcore.scenarios.load(given),
+    ):
+        with pytest.raises((ScenarioError, ValueError)) as caught:
+            use()
+        assert "ambiguous" not in str(caught.value)
+
+
+PATHS = [5, 1.5, True, b"x", "", "a\0b", "\ud800", ["x"], object(), Broken()]
+
+
+@pytest.mark.parametrize("given", PATHS, ids=lambda given: type(given).__name__)
+def test_what_is_no_path_is_refused_by_name(tmp_path, given):
+    run = tadcore.simulate(SC)
+    study = Study(SC, vary={"attacker.position": sampling.Box(-1, 1)}, trials=2)
+    result = study.run()
+    for use in (
+        SC.to_toml,
+        run.save,
+        run.animate(seconds=0.1, fps=5).save,
+        tadcore.outcome_map(SC, x=(0, 1, 2), y=(0, 1, 2)).save,
+        lambda path: tadcore.report.report(result, path),
+        lambda path: tadcore.reproduce.reproduce(path),
+        lambda path: study.run(store=path),
+        lambda path: study.run(table=path),
+        tadcore.load_study,
+        Scenario.from_toml,
+        Study.from_toml,
+        lambda path: tadcore.scenarios.find("x.toml", path),
+        lambda path: Study.from_toml_string("", folder=path),
+    ):
+        with pytest.raises(ScenarioError):
+            use(given)
+
+
+def test_draws_of_a_callable_that_reuses_its_memory_are_kept_apart():
+    """It fills the same array at every call, and hands it out."""
+
+    class Reusing:
+        def __init__(self, components):
+            self.memory = np.empty((8192, components))
+
+        def __call__(self, rng, size):
+            memory = self.memory[:size]
+            memory[...] = rng.uniform(1.0, 3.0, memory.shape)
+            return memory
+
+    for components, paths in ((1, ["d1", "d2"]), (2, ["d1", "d2"])):
+        field = "visibility_radius" if components == 1 else "position"
+        fresh = lambda rng, size, c=components: rng.uniform(1.0, 3.0, (size, c))  # noqa: E731
+        reusing = Reusing(components)
+        wanted = Study(SC, vary={f"{p}.{field}": fresh for p in paths}, trials=50).run()
+        found = Study(SC, vary={f"{p}.{field}": reusing for p in paths}, trials=50).run()
+        assert len(found.inputs) == 2 * components
+        for name, values in wanted.inputs.items():
+            np.testing.assert_array_equal(found.inputs[name], values)
+        first, second = (values for name, values in found.inputs.items() if name.endswith(("radius", ".x")))
+        assert not np.array_equal(first, second)
+
+
+RETURNS = {
+    "ragged": lambda rng, size: [[0.0, 0.0]] * (size - 1) + [[0.0]],
+    "nothing": lambda rng, size: None,
+    "a string": lambda rng, size: "x",
+    "too few": lambda rng, size: np.zeros((size - 1, 2)),
+    "turned": lambda rng, size: np.zeros((2, size)),
+    "complex": lambda rng, size: np.zeros((size, 2), dtype=complex),
+    "objects": lambda rng, size: np.zeros((size, 2), dtype=object),
+    "masked": lambda rng, size: np.ma.masked_array(np.zeros((size, 2)), mask=True),
+    "masked in a list": lambda rng, size: [np.ma.masked_array([0.0, 0.0], mask=[0, 1])] * size,
+    "broken": lambda rng, size: Broken(),
+    "a generator": lambda rng, size: (row for row in np.zeros((size, 2))),
+}
+
+
+@pytest.mark.parametrize("function", RETURNS.values(), ids=RETURNS.keys())
+def test_what_a_callable_must_not_return_is_named(function, tmp_path):
+    for options in ({}, {"store": tmp_path / "store"}):
+        with pytest.raises(ScenarioError, match=r"^what .* returns: got .*, must be an array of numbers"):
+            Study(SC, vary={"attacker.position": function}, trials=5).run(**options)
+    assert not list(tmp_path.glob("store/part*"))
+
+
+@pytest.mark.parametrize(
+    "given", [lambda: 1, lambda rng: 1, int, float, dict, sampling.Box, object(), "normal", 5, None]
+)
+def test_what_is_no_sampler_is_refused(given):
+    with pytest.raises(ScenarioError, match=r"^vary\["):
+        Study(SC, vary={"attacker.position": given}, trials=5)
+
+
+def test_a_density_estimate_is_a_sampler():
+    rng = np.random.default_rng(1)
+    seen = rng.normal([-1.0, 1.0], [0.2, 0.4], (400, 2))
+    study = Study(SC, vary={"attacker.position": stats.gaussian_kde(seen.T)}, trials=20_000, seed=3)
+    drawn = np.stack(list(study.draws().values()) if hasattr(study, "draws") else list(study.run().inputs.values()))
+    np.testing.assert_allclose(drawn.mean(axis=1), seen.mean(axis=0), atol=0.02)
+    covariance = np.cov(seen.T) + stats.gaussian_kde(seen.T).covariance  # of an estimate: what was seen, and its kernel
+    np.testing.assert_allclose(np.cov(drawn), covariance, atol=0.01)
+    with pytest.raises(ScenarioError, match=r"returns: got .*, must be an array of numbers of shape \(8192, 2\)"):
+        Study(SC, vary={"attacker.position": stats.gaussian_kde(seen[:, 0])}, trials=5).run()
+    with pytest.raises(ScenarioError, match='this one needs design="random"'):
+        Study(SC, vary={"attacker.position": stats.gaussian_kde(seen.T)}, trials=5, design="sobol")
+
+
+@pytest.mark.parametrize("kind", [concurrent.futures.ThreadPoolExecutor, concurrent.futures.ProcessPoolExecutor])
+def test_an_executor_that_was_shut_down_is_named(kind):
+    executor = kind(1)
+    executor.shutdown()
+    study = Study(SC, vary={"attacker.position": sampling.Box(-1, 1)}, trials=5)
+    with pytest.raises(ScenarioError, match=r"^executor: got .*, must be open: this one has been shut down"):
+        study.run(executor=executor)
