@@ -27,6 +27,7 @@ LOCK = "_store.lock"
 """The name of the lock in a store."""
 
 _UNSUPPORTED = {errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.ENOLCK}
+_HELD = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES}
 _STALE = 60.0  # seconds after which a lock file without an owner is what a lock of the system left
 _OWNER = re.compile(
     r"(?:filelock/2\s+)?(?:pid=)?(?P<pid>\d+)\n(?:host=)?(?P<host>[^\n]+)\n"
@@ -76,24 +77,30 @@ def _has_locks(path: Path) -> bool:
         import fcntl
     except ImportError:
         return True  # Windows, whose locks are always there
-    made = not path.exists()
-    with path.open("ab") as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
+    made = True
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    except FileExistsError:
+        made, descriptor = False, os.open(path, os.O_RDWR)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in _HELD:
             return True
-        except OSError as error:
-            if error.errno not in _UNSUPPORTED:
-                raise
-            if made:
-                path.unlink(missing_ok=True)
-            return False
-        return True
+        if error.errno not in _UNSUPPORTED:
+            raise
+        if made:  # by this very call, so it is nobody's lock
+            path.unlink(missing_ok=True)
+        return False
+    finally:
+        os.close(descriptor)
+    return True
 
 
 def _owner(path: Path) -> Owner | None:
     try:
-        match = _OWNER.match(path.read_text(encoding="utf-8", errors="replace")[:1024])
+        with path.open("rb") as stream:
+            match = _OWNER.match(stream.read(1024).decode(errors="replace"))
     except OSError:
         return None
     return None if match is None else Owner(int(match["pid"]), match["host"])
