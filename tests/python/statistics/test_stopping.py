@@ -1,6 +1,8 @@
 """What statistics say after a rule stopped a study: coverage computed exactly, by enumeration, not by simulation."""
 
 import math
+import shutil
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +10,8 @@ import pytest
 from scipy import special, stats
 
 import tadcore
-from tadcore import HalfWidth, ScenarioError
+from study_cases import resealed
+from tadcore import HalfWidth, ScenarioError, StoreError
 from tadcore.analysis import radius_curve
 from tadcore.cli.app import main
 from tadcore.report import report
@@ -25,6 +28,7 @@ from tadcore.statistics import (
     proportion_interval,
 )
 from tadcore.statistics.intervals import ends
+from tadcore.study.manifest import MANIFEST, Manifest
 
 
 def misses(p, look, most, decide, covers):
@@ -281,3 +285,22 @@ def p_many(b, k):
 def test_a_result_without_the_attribute_was_fixed():
     plain = SimpleNamespace(kind=[1], defender=[-1], scenario=SimpleNamespace(n=1))
     assert tadcore.statistics.probabilities_of(plain).low == pytest.approx(probabilities([1], [-1], 1).low)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [None, 3, {}, {"rule": 3, "level": 0.9}, {"rule": "R"}, {"rule": "R", "level": 2}, {"rule": "R", "level": "0.9"}],
+)
+def test_a_manifest_with_no_rule_in_its_place_is_named(folder, tmp_path, rule):
+    store = tmp_path / "store"
+    shutil.copytree(folder, store)
+    resealed(store, rule=rule)
+    with pytest.raises(StoreError, match="manifest"):
+        tadcore.load_study(store)
+
+
+def test_a_store_of_a_study_that_was_stopped_without_naming_the_rule(folder, tmp_path):
+    store = tmp_path / "store"
+    shutil.copytree(folder, store)
+    (store / MANIFEST).write_text(replace(Manifest.read(store), rule=None).to_json(), encoding="utf-8")
+    assert tadcore.load_study(store).probabilities().rule == "stopped by a rule"
