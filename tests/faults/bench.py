@@ -41,13 +41,12 @@ def armed(of, name):
     call = getattr(of, name)
     def instead(*given, **options):
         global calls
-        calls += 1
+        calls += stage != "create" or ".tadcore-" in str(given[0])  # of all that is opened, what is to be written
         if calls == 4:  # the manifest, the first part, then the second (each is synced twice: the file, its folder)
             os.kill(os.getpid(), signal.SIGKILL)
         return call(*given, **options)
     setattr(of, name, instead)
-import tempfile
-of, name = {"create": (tempfile, "mkstemp"), "sync": (os, "fsync"), "rename": (Path, "replace")}[stage]
+of, name = {"create": (os, "open"), "sync": (os, "fsync"), "rename": (Path, "replace")}[stage]
 armed(of, name)
 """
 
