@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 import os
@@ -165,6 +166,7 @@ def _arrows(edges: tuple[Edge, ...]) -> list[str]:
     return [f"{observer}->{seen}" for observer, seen in edges]
 
 
+@functools.cache
 def fields_of(kind: type[Any]) -> tuple[list[str], dict[str, TypeAdapter[Any]]]:
     """The fields of a run that are arrays, and how each other one, the scenario apart, becomes JSON and comes back."""
     hints = get_type_hints(kind)
