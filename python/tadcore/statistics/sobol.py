@@ -9,8 +9,11 @@ total index of zero could be fixed anywhere (Sobol' 2001). Here Y is an outcome,
 Two matrices A and B of n points each and the d matrices A with one column from B, n (d + 2) games in all, give both
 indices of every input (Saltelli et al. 2010; `scipy.stats.sobol_indices` has the same estimators). The points are a
 scrambled Sobol' sequence. Intervals are percentiles of a bootstrap over the n rows, each by itself: an approximation,
-which no theorem bounds. A Sobol' sequence is more even than independent points, which makes them wide; an outcome
-that only a few of the points differ in makes them unreliable. An estimate of a small index may be a little below 0.
+which no theorem bounds. A Sobol' sequence is more even than independent points, which makes them wide. A quantity that
+is the same at all but few points makes them far too narrow: for events at 30 of 2,048 points 95 % intervals held in
+23 % to 100 % of 100 repetitions, at 120 of them in 99 % or more. So where it is one value at most points, and another
+at fewer than 100 of A and B, the interval is all that is known, [0, 1]. An estimate of a small index may be a little
+below 0.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index, refuse_where
 from tadcore._shared.shares import estimate as interval, percent
@@ -30,6 +34,8 @@ from .outcomes import as_level
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_FEWEST = 100  # points of A and B at which an event happens, or does not, for a bootstrap to see it
 
 
 class Distribution(Protocol):
@@ -165,6 +171,8 @@ def sobol(
     estimate = _indices(f)
     resampled = np.array([_indices(f[..., rng.integers(0, n, n)]) for _ in range(again)])
     low, high = _percentiles(resampled, (1.0 - confidence) / 2.0, estimate)
+    rare = _rare(f[:, :2].reshape(s, -1))
+    low[:, rare], high[:, rare] = np.minimum(estimate, 0.0)[:, rare], np.maximum(estimate, 1.0)[:, rare]
     return Sensitivity(
         inputs=tuple(inputs),
         outputs=tuple(outputs),
@@ -219,6 +227,12 @@ def _indices(f: Floats) -> Floats:
     variance = np.where(np.ptp(f[:, :2], axis=(1, 2)) > 0.0, f[:, :2].var(axis=(1, 2)), np.nan)[:, np.newaxis]
     variance = np.where(variance > 0.0, variance, np.nan)  # squares of tiny differences may vanish
     return np.array([(b * (mixed - a)).mean(axis=2), 0.5 * ((a - mixed) ** 2).mean(axis=2)]) / variance
+
+
+def _rare(values: Floats) -> NDArray[np.bool_]:
+    """Which quantities are mostly one value, with too few others for a bootstrap; shape (s,) from (s, 2n)."""
+    others = np.array([len(row) - np.unique(row, return_counts=True)[1].max() for row in values])
+    return np.asarray((others < _FEWEST) & (others <= values.shape[1] // 2))
 
 
 def _percentiles(resampled: Floats, tail: float, estimate: Floats) -> tuple[Floats, Floats]:

@@ -224,6 +224,33 @@ def test_a_rare_outcome_that_vanishes_in_resamples_widens_the_interval():
     assert found.total_high[0, 0] >= 1.0
 
 
+@pytest.mark.parametrize(("factors", "inputs"), [(1, 2), (2, 2), (3, 3)])
+@pytest.mark.parametrize(("chance", "points"), [(0.02, 512), (0.25, 256)])
+def test_intervals_of_events_hold_or_say_nothing(factors, inputs, chance, points):
+    """An event of independent inputs, all below r: its indices have closed forms. Rare ones get the whole range."""
+    r = chance ** (1 / factors)
+    names = {f"x{i}": stats.uniform() for i in range(inputs)}
+    variance = chance * (1 - chance)
+    first = [(chance**2 / r - chance**2) / variance if i < factors else 0.0 for i in range(inputs)]
+    total = [1 - (r ** (factors + 1) - chance**2) / variance if i < factors else 0.0 for i in range(inputs)]
+    missed, repetitions = np.zeros((2, inputs)), 20
+    for seed in range(repetitions):
+        found = sobol(
+            lambda x: (x[:factors] < r).all(axis=0)[np.newaxis] * 1.0,
+            names,
+            ["y"],
+            points=points,
+            seed=seed,
+            resamples=100,
+        )
+        if chance < 0.1:
+            assert (found.first_low <= 0).all()
+            assert (found.total_high >= 1).all()
+        missed[0] += (found.first_low[0] > np.add(first, 1e-9)) | (found.first_high[0] < np.subtract(first, 1e-9))
+        missed[1] += (found.total_low[0] > np.add(total, 1e-9)) | (found.total_high[0] < np.subtract(total, 1e-9))
+    assert (missed / repetitions <= 0.05 + 3 * math.sqrt(0.05 * 0.95 / repetitions)).all()
+
+
 class Odd:
     """A distribution whose inverse is not one."""
 
