@@ -6,6 +6,8 @@ attacker captures a target within σ_a; else, at t = T, time runs out.
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 from tadcore._shared.arrays import Floats
@@ -36,13 +38,13 @@ def check_start(run: Run) -> Check:
 
 
 def grid(run: Run) -> Floats:
-    """t_k = kT/K for every row of the record, T itself at K."""
-    K, T = run.scenario.steps, run.scenario.horizon
-    return np.array([T if k == K else k * T / K for k in range(len(run.times))])
+    """The doubles nearest to t_k = kT/K, by exact fractions, for every row of the record."""
+    K, T = run.scenario.steps, Fraction(run.scenario.horizon)
+    return np.array([float(T * k / K) for k in range(len(run.times))])
 
 
 def check_times(run: Run) -> Check:
-    """How far an instant is from kT/K, relative to it."""
+    """How far an instant is from the double nearest to kT/K, relative to it, or to δ at t = 0."""
     expected = grid(run)
     size = np.maximum(expected, run.scenario.horizon / run.scenario.steps)
     off = np.abs(run.times - expected) / size
@@ -69,7 +71,7 @@ def _contradictions(run: Run) -> list[tuple[float, str]]:
         k, i = np.unravel_index(int(np.argmax(depth[:-1])), depth[:-1].shape)
         found.append((float(depth[k, i]), f"{label[i]} is within the capture radius at t = {run.times[k]:.6g} already"))
     expected = grid(run)[last]
-    if not abs(outcome.time - expected) <= 1e-15 * expected:
+    if outcome.time != expected:
         found.append((_NONE, f"the end is said to be at t = {outcome.time!r}, the last row is t = {float(expected)!r}"))
     team, target = depth[last, :-1], float(depth[last, -1])
     named = outcome.defender
