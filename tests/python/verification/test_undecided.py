@@ -225,3 +225,15 @@ def test_the_quadrature_of_the_indices_errs_by_less_than_it_says(step):
         adapted.inside = adapted._values_inside()
         for index in adapted.index(sampled=False):
             assert index.error <= index.doubt or not index.converged
+
+
+def test_a_protocol_at_the_optimum_that_rounding_keeps_from_silence(monkeypatch):
+    run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
+    real = v.checks.decentral.decentralise
+    for gap, status in ((1e-15, "passed"), (1e-3, "undecided")):
+
+        def talking(*args, gap=gap, **options):
+            return dataclasses.replace(real(*args, **options), converged=False, gap=gap)
+
+        monkeypatch.setattr(v.checks.decentral, "decentralise", talking)
+        assert v.check_decentral(run).status == status
