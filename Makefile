@@ -19,7 +19,7 @@ LISTED := $(BIN)/python -c 'import sys, tomllib; p = tomllib.load(open("pyprojec
   print(*p["dependencies"], *(x for e in sys.argv[1:] for x in p["optional-dependencies"][e]), sep="\n")'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop installed demo test test-rust test-python heavy faults fuzz sanitize mutants audit lint format \
+.PHONY: help setup develop installed demo test test-rust test-python lowest heavy faults fuzz sanitize mutants audit lint format \
         bench peers images docs wheel sdist check clean
 
 help:  ## list the targets
@@ -72,6 +72,19 @@ test-rust:
 test-python: setup
 	$(BIN)/python -m pytest
 	$(BIN)/python -m mypy.stubtest tadcore._core
+
+# The compiled core is the one of this checkout. Old wheels are made for old Pythons: 3.11 where there is one.
+LOWEST        := .venv-lowest
+LOWEST_PYTHON ?= $(or $(shell command -v python3.11),$(PYTHON))
+$(LOWEST)/.packages: pyproject.toml tests/lowest.py
+	@echo "== the lowest versions that pyproject.toml declares, in $(LOWEST)"
+	@$(LOWEST_PYTHON) -m venv --clear $(LOWEST)
+	@$(LOWEST)/bin/python tests/lowest.py requirements \
+	  | $(LOWEST)/bin/python -m pip install --quiet --requirement /dev/stdin
+	@touch $@
+
+lowest: $(CORE) $(LOWEST)/.packages  ## every part of the package once, with the lowest versions of all dependencies
+	PYTHONPATH=python MPLBACKEND=agg $(LOWEST)/bin/python tests/lowest.py
 
 heavy: setup  ## the tests that take minutes or gigabytes: a million steps, forty defenders with limited sight
 	$(BIN)/python -m pytest -m heavy
@@ -145,4 +158,4 @@ sdist: $(BIN)/maturin  ## build the source archive, into dist/
 check: lint test  ## everything that must pass before a change lands
 
 clean:  ## remove what the other targets made
-	rm -rf $(VENV) $(OUT) target dist build docs/_build
+	rm -rf $(VENV) $(LOWEST) $(OUT) target dist build docs/_build

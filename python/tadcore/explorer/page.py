@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bokeh.models import LayoutDOM
 
 
+_LEAST = 0.05
 _UNLIMITED = 10.0  # the right end of a visibility slider
 _GRAB = 0.05  # of the picture: how near the pointer must be to what it grabs
 
@@ -230,7 +231,7 @@ class Page:
         self._zeta: dict[str, tuple[Slider, Toggle]] = {}
         rows: list[LayoutDOM] = []
         for player in sc.constrained:
-            slider = Slider(start=0.05, end=_UNLIMITED, step=0.05, value=1.0, title=f"ζ of {player}", width=190)
+            slider = Slider(start=_LEAST, end=_UNLIMITED, step=0.05, value=1.0, title=f"ζ of {player}", width=190)
             switch = Toggle(label="∞", width=40, align="end")
             slider.on_change("value", lambda a, old, new, p=player: self._slide_sight(p))
             switch.on_change("active", lambda a, old, new, p=player: self._slide_sight(p))
@@ -254,20 +255,26 @@ class Page:
             switch.active = math.isinf(radius)
             slider.disabled = switch.active
             if not switch.active:
-                slider.update(end=max(_UNLIMITED, float(radius)), value=float(radius))
+                reach = {"start": min(_LEAST, float(radius)), "end": max(_UNLIMITED, float(radius))}
+                slider.update(**reach, value=float(radius))
         for player, radius in zip((*sc.players[: sc.n], "attacker"), sc.capture_radii, strict=True):
-            self._sigma[player].update(end=max(0.6, float(radius)), value=float(radius))
+            self._sigma[player].update(start=min(0.01, float(radius)), end=max(0.6, float(radius)), value=float(radius))
         self._quiet = False
 
     def _slide_sight(self, player: str) -> None:
         if not self._quiet:
             slider, switch = self._zeta[player]
             slider.disabled = bool(switch.active)
-            self.change(lambda: self.explorer.see(player, math.inf if switch.active else float(slider.value)))
+            self._slid(lambda: self.explorer.see(player, math.inf if switch.active else float(slider.value)))
 
     def _slide_capture(self, player: str, radius: float) -> None:
         if not self._quiet:
-            self.change(lambda: self.explorer.capture(player, radius))
+            self._slid(lambda: self.explorer.capture(player, radius))
+
+    def _slid(self, action: Callable[[], None]) -> None:
+        """Do what a slider says; one whose value is refused goes back to what is played."""
+        if not self.change(action):
+            self._set_sliders()
 
     def _button(self, label: str, action: Callable[[], None]) -> Button:
         button = Button(label=label, width=160, tags=[self.download])  # so that the source is part of the document

@@ -1,6 +1,7 @@
 """The explorer: what a drag does on the server, and the page in a real browser where there is one."""
 
 import base64
+import contextlib
 import math
 import os
 import re
@@ -274,6 +275,79 @@ def address():
     finally:
         running.terminate()
         running.communicate(timeout=10)
+
+
+def test_a_refused_slider_goes_back_to_what_is_played(page):
+    slider, switch = page._zeta["d3"]
+    own = slider.value
+    slider.value = 0.1
+    assert "visibility_radius: got 0.1, must be larger than the capture radius" in page.status.text
+    assert slider.value == own == page.explorer.scenario.defenders[2].visibility_radius
+    assert not switch.active
+    capture = page._sigma["d3"]
+    own = capture.value
+    capture.value = 0.6 if own != 0.6 else 0.59
+    played = page.explorer.scenario.defenders[2]
+    assert capture.value == played.capture_radius
+    page._sigma["d1"].value = 0.3
+    assert page.explorer.scenario.defenders[0].capture_radius == 0.3, "and is of use again"
+
+
+def ask(port, *lines):
+    """The answer to bare lines of HTTP: its first line, and all of it."""
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
+        connection.sendall("\r\n".join([*lines, "Connection: close", "", ""]).encode())
+        answer = b""
+        with contextlib.suppress(TimeoutError):
+            while part := connection.recv(65536):
+                answer += part
+                if b" 101 " in answer:
+                    break
+    return answer.split(b"\r\n")[0].decode(), answer.decode("utf-8", "replace")
+
+
+def test_only_this_machine_is_answered(address):
+    """Another site's name may lead here, and a program may say nothing of where it comes from."""
+    port = int(address.rsplit(":", 1)[1].strip("/"))
+    for host in (f"localhost:{port}", f"127.0.0.1:{port}", f"LOCALHOST:{port}"):
+        first, page = ask(port, "GET / HTTP/1.1", f"Host: {host}")
+        assert "200" in first
+    token = re.search(r'"token":"([^"]+)"', page)[1]
+    hosts = (
+        "evil.example",
+        f"evil.example:{port}",
+        "localhost",
+        f"localhost.evil.example:{port}",
+        f"localhost:{port + 1}",
+        "",
+    )
+    for host in hosts:
+        for path in ("/", "/autoload.js?bokeh-autoload-element=1", "/ws", "/metadata", "/static/js/bokeh.min.js"):
+            first, page = ask(port, f"GET {path} HTTP/1.1", f"Host: {host}")
+            assert "403" in first or "400" in first, (host, path)
+            assert "token" not in page
+    first, page = ask(port, "GET / HTTP/1.1", f"Host: localhost:{port}", "Origin: http://evil.example")
+    assert "403" in first
+    assert "token" not in page
+    upgrade = (
+        "GET /ws HTTP/1.1",
+        "Upgrade: websocket",
+        "Connection: Upgrade",
+        "Sec-WebSocket-Version: 13",
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        f"Sec-WebSocket-Protocol: bokeh, {token}",
+    )
+    here = f"localhost:{port}"
+    for lines, wanted in (
+        ((f"Host: {here}", f"Origin: http://{here}"), "101"),
+        ((f"Host: 127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}"), "101"),
+        ((f"Host: {here}",), "403"),
+        ((f"Host: {here}", "Origin: http://evil.example"), "403"),
+        ((f"Host: {here}", "Origin: null"), "403"),
+        ((f"Host: {here}", f"Origin: https://{here}"), "403"),
+        ((f"Host: evil.example:{port}", f"Origin: http://evil.example:{port}"), "403"),
+    ):
+        assert wanted in ask(port, *upgrade, *lines)[0], lines
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
