@@ -117,8 +117,12 @@ def verify(
     if len(run.times) < 2:
         note = "the game is over at t = 0: there is no play to check"
         return _settled(combine(title, [*parts, VerificationReport("run", (), notes=(note,))]))
+    diverged = getattr(run, "diverged", None)
+    if diverged is None:
+        parts.append(family("nafne", lambda: check_nafne(run, equilibrium, deviations=deviations, seed=seed)))
+    else:
+        parts.append(_undecided("nafne", ArithmeticError(f"the game {diverged}: deviations from it decide nothing")))
     parts += [
-        family("nafne", lambda: check_nafne(run, equilibrium, deviations=deviations, seed=seed)),
         family("consistency", lambda: check_consistency(run, equilibrium)),
         family(
             "gains",

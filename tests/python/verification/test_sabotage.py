@@ -7,6 +7,7 @@ reads a wrong number. The others have one array or count changed.
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -359,6 +360,22 @@ def test_the_whole_report_refuses_and_names_the_cause(run):
     assert report.status == "failed"
     assert "record.attacker" in {check.name for check in report.failures}
     assert RECORD["record.attacker"].remedy in repr(report)
+
+
+@pytest.mark.parametrize(("field", "check"), [("P", "fne.riccati"), ("feedback", "fne.feedback")])
+@pytest.mark.parametrize("row", [0, 217, -2])
+def test_one_wrong_row_of_the_equilibrium(run, field, check, row, monkeypatch):
+    """P at one node, or one row of the feedback, also beyond the end of the run."""
+    eq = tadcore.solve_equilibrium(run.scenario)
+    parts = {"times": eq.times, "P": dict(eq.P), "feedback": dict(eq.feedback)}
+    name, array = next(iter(parts[field].items()))
+    parts[field][name] = changed(array, (row, *(0 for _ in array.shape[1:])), 1e-8)
+    spoilt = SimpleNamespace(**parts)
+    report = v.check_equilibrium(run.scenario, spoilt)
+    assert report.failures[0].name.startswith(check), report
+    monkeypatch.setattr(v.every_check, "solve_equilibrium", lambda _: spoilt)
+    whole = tadcore.verify(run, deviations=0, instants=1)
+    assert whole.failures[0].name.startswith(check)
 
 
 def test_a_record_that_is_not_whole_ends_the_report(run):
