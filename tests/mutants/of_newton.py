@@ -9,7 +9,7 @@ MUTANTS = {
         ("empty unknowns, large", "if «i < used»", "i <= used"),
         ("a pivot, large", "|| «pivot <= 0.0»", "pivot > 0.0"),
         ("C = LD, large", "«f[i * d + j] * pivot»", "f[i * d + j] / pivot"),
-        ("1 / D, large", "«1.0 / pivot»", "pivot"),
+        ("1 / D, large", "f[j * d + j] = «1.0 / f[j * d + j]»;", "f[j * d + j]"),
         ("(LD)⁻¹x: 1 / D", "«y[j] * c[j][first + j]»", "y[j] / c[j][first + j]"),
         ("(LD)⁻¹x: in a tile", "«y[i].minus(z[j], c[j][first + i])»", "y[i].plus(z[j], c[j][first + i])"),
         ("xᵀ(H + μI)⁻¹x", "«sum.plus(y[j], z[j])»", "sum.minus(y[j], z[j])"),

@@ -22,6 +22,10 @@ def play():
     while True:
         tadcore.simulate_batch(sc, positions, threads=2)
 
+# What Python imports when it is first needed it imports now: locks of imports are its own.
+tadcore.simulate_batch(sc, positions[:1])
+tadcore.simulate(sc)
+tadcore.solve_equilibrium(sc)
 if what == "play":
     threading.Thread(target=play, daemon=True).start()
 for k in range(6):
