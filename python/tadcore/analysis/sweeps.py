@@ -184,6 +184,8 @@ def sweep(
     >>> swept.to_xarray().sizes["attacker.evasion"]
     2
     """
+    if not isinstance(study, Study):
+        raise ScenarioError("study", study, "a tadcore.Study")
     axes = _axes(study, grid)
     points = [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
     studies = [_cell_study(study, point) for point in points]

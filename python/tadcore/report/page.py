@@ -39,6 +39,10 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
+    if not all(hasattr(result, name) for name in ("scenario", "study", "seed", "kind")):
+        raise ScenarioError("result", result, "a StudyResult, as Study.run and load_study return it")
+    if not isinstance(title, str) or not title.isprintable():
+        raise ScenarioError("title", title, "one line of text")
     target = as_path("out", out)
     if target.is_dir():
         raise ScenarioError("out", str(out), "a file to write, not a folder")

@@ -7,7 +7,6 @@ one another and together are certain, then ``"d1"`` … ``"dn"``, interception b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -127,10 +126,9 @@ def outcome_counts(kind: ArrayLike, defender: ArrayLike, n: int) -> dict[str, in
 
 def as_level(level: Any) -> float:
     """A confidence level: a number strictly between 0 and 1."""
-    if isinstance(level, int | float | np.floating) and not isinstance(level, bool):
-        value = float(level)
-        if math.isfinite(value) and 0.0 < value < 1.0:
-            return value
+    number = isinstance(level, int | float | np.floating) and not isinstance(level, bool)
+    if number and 0.0 < level < 1.0 and 0.0 < float(level) < 1.0:  # a longer double may round to 1
+        return float(level)
     raise ScenarioError("level", level, "a confidence level in (0, 1), such as 0.95")
 
 

@@ -73,7 +73,7 @@ class HalfWidth:
     def __post_init__(self) -> None:
         as_level(self.level)
         number = isinstance(self.width, int | float | np.floating) and not isinstance(self.width, bool)
-        if not number or not 0.0 < float(self.width) < 0.5:
+        if not number or not 0.0 < self.width < 0.5:
             raise ScenarioError("width", self.width, "a half-width in (0, 0.5)")
 
     def intervals(self, counts: Mapping[str, int] | ArrayLike, trials: int) -> dict[str, tuple[float, float]]:

@@ -137,24 +137,20 @@ def test_a_closed_pipe_is_no_catastrophe():
     assert b"Traceback" not in err
 
 
-ENCODINGS = ["ascii", "gbk", "cp932", "cp1253", "cp1252", "latin-1", "utf-8", "utf-16"]
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("encoding", ["ascii", "gbk", "cp932", "cp1253", "utf-16"])
 def test_a_scenario_printed_into_a_file_is_read_again(tmp_path, encoding):
     """Whatever the locale says, a scenario is UTF-8."""
-    for name in ("paper-i1", "paper-i2"):
-        done = subprocess_run("scenarios", name, PYTHONIOENCODING=encoding)
-        assert (done.returncode, done.stderr) == (0, b"")
-        assert done.stdout == scenarios.text(name).encode("utf-8")
-        place = tmp_path / "my.toml"
-        place.write_bytes(done.stdout)
-        assert subprocess_run("validate", str(place), PYTHONIOENCODING=encoding).returncode == 0
+    done = subprocess_run("scenarios", "paper-i1", PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout == scenarios.text("paper-i1").encode("utf-8")
+    place = tmp_path / "my.toml"
+    place.write_bytes(done.stdout)
+    assert subprocess_run("validate", str(place), PYTHONIOENCODING=encoding).returncode == 0
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
-def test_a_locale_of_any_kind_gets_its_scenario(encoding):
-    done = subprocess_run("scenarios", "paper-i1", LC_ALL="C", PYTHONCOERCECLOCALE="0", PYTHONUTF8="0")
+@pytest.mark.parametrize("locale", ["C", "POSIX", "en_US.ISO-8859-1"])
+def test_a_locale_of_any_kind_gets_its_scenario(locale):
+    done = subprocess_run("scenarios", "paper-i1", LC_ALL=locale, PYTHONCOERCECLOCALE="0", PYTHONUTF8="0")
     assert done.stdout == scenarios.text("paper-i1").encode("utf-8")
 
 
@@ -190,16 +186,15 @@ def test_standard_input_stands_for_a_file(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
-@pytest.mark.parametrize("columns", ["0", "-1", "1", "x", "", "9" * 30])
+@pytest.mark.parametrize("columns", ["0", "-1", "1", "x", "9" * 30])
 def test_a_terminal_of_any_width_gets_its_answer(columns):
-    for environment in ({"COLUMNS": columns}, {"COLUMNS": columns, "FORCE_COLOR": "1"}, {"LINES": columns}):
-        done = subprocess_run("validate", "paper-i1", **environment)
-        words = b" ".join(done.stdout.split())
-        assert words.startswith(b"paper-i1: valid I1, defenders against attacker and target")
-        assert words.endswith(b"captures within 0.1")
-        done = subprocess_run("validate", "nothing-like-it", **environment)
-        assert done.returncode == 2
-        assert b"must be a file, or the name of a bundled scenario" in b" ".join(done.stderr.split())
+    done = subprocess_run("validate", "paper-i1", COLUMNS=columns, LINES=columns)
+    words = b" ".join(done.stdout.split())
+    assert words.startswith(b"paper-i1: valid I1, defenders against attacker and target")
+    assert words.endswith(b"captures within 0.1")
+    done = subprocess_run("validate", "nothing-like-it", COLUMNS=columns, FORCE_COLOR="1")
+    assert done.returncode == 2
+    assert b"must be a file, or the name of a bundled scenario" in b" ".join(done.stderr.split())
 
 
 @pytest.mark.parametrize("term", ["dumb", "", "unknown"])

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -297,3 +298,42 @@ def test_an_executor_that_was_shut_down_is_named(kind):
     study = Study(SC, vary={"attacker.position": sampling.Box(-1, 1)}, trials=5)
     with pytest.raises(ScenarioError, match=r"^executor: got .*, must be open: this one has been shut down"):
         study.run(executor=executor)
+
+
+@pytest.mark.parametrize("given", [*NOT_A_SCENARIO, SC, EXPECTED], ids=lambda given: type(given).__name__)
+def test_what_is_no_result_is_refused_by_name(given, tmp_path):
+    from tadcore import plotting
+
+    for name in ("trajectories", "network", "visibility", "controls", "distances", "gains", "theta", "externality"):
+        with pytest.raises(ScenarioError, match=r"^run: got .*, must be a Run"):
+            getattr(plotting, name)(given)
+    with pytest.raises(ScenarioError, match=r"^run_b: got .*, must be a Run"):
+        plotting.compare(tadcore.simulate(SC), given)
+    with pytest.raises(ScenarioError, match=r"^result: got .*, must be a StudyResult"):
+        tadcore.report.report(given, tmp_path / "page.html")
+    with pytest.raises(ScenarioError, match=r"^study: got .*, must be a tadcore.Study"):
+        tadcore.sweep(given, {"horizon": [1.0]})
+    assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("given", [None, 0, -1, 1.5, "2", 10**9, True, np.array([2])], ids=repr)
+def test_odd_panels_are_refused_by_name(given):
+    run = tadcore.simulate(SC)
+    for draw, name in ((run.plot.gains, "columns"), (run.plot.network, "columns"), (run.plot.network, "max_panels")):
+        with pytest.raises(ScenarioError, match=rf"^{name}: got .*, must be a whole number in \[1, 1000\]"):
+            draw(**{name: given})
+    assert plt.get_fignums() == []
+
+
+NEARLY_ONE = np.longdouble(1) - np.finfo(np.longdouble).epsneg
+
+
+@pytest.mark.parametrize(
+    "given",
+    [None, 10**400, -(10**400), "x", float("nan"), True, 1.0, 0, NEARLY_ONE],
+)
+def test_odd_levels_and_widths_are_refused_by_name(given):
+    with pytest.raises(ScenarioError, match=r"^level: got"):
+        tadcore.HalfWidth(0.1, level=given)
+    with pytest.raises(ScenarioError, match=r"^width: got"):
+        tadcore.HalfWidth(given)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import new_axes
+from tadcore.plotting.tools.axes import as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, outcome_text
 
@@ -51,6 +51,8 @@ def compare(
     Axes
         The axes drawn in.
     """
+    as_run(run_a, "run_a")
+    as_run(run_b, "run_b")
     if run_a.scenario.players != run_b.scenario.players:
         raise ValueError(
             f"the runs have different players: {', '.join(run_a.scenario.players)} and "

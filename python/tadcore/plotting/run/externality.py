@@ -8,7 +8,7 @@ import numpy as np
 
 from tadcore.game.externality import control_jumps
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import above, new_axes
+from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.style import PAGE, edge_text, look
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
     Axes
         The axes drawn in.
     """
+    as_run(run)
     found = control_jumps(run)
     ax = new_axes(ax, PAGE, 2.6)
     count = found.sizes["time"]

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import above, new_panels
+from tadcore.plotting.tools.axes import above, as_run, new_panels
 from tadcore.plotting.tools.style import look, symbol
 
 from .series import MAX_VERTICALS, mark_changes, span
@@ -44,6 +44,7 @@ def gains(
     Axes or array of Axes
         ``axes`` as given, or the array of the new ones.
     """
+    as_run(run)
     observers = run.scenario.constrained
     if axes is None:
         axes = new_panels(len(observers), columns, page_from=2, row=1.15, rest=0.6, sharex=True)

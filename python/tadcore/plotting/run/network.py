@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_index
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import new_panels
+from tadcore.plotting.tools.axes import as_run, new_panels
 from tadcore.plotting.tools.style import look, note
 
 if TYPE_CHECKING:
@@ -53,9 +53,10 @@ def network(
     Axes or array of Axes
         ``axes`` as given, or the array of the new ones.
     """
+    as_run(run)
     changes = run.network_changes
     if axes is None:
-        count = max(min(len(changes), max_panels), 1)
+        count = max(min(len(changes), as_index("max_panels", max_panels, 1000, least=1)), 1)
         axes = new_panels(count, columns, page_from=4, row=0.22, rest=0.0, square=True)
     panels = list(np.asarray(axes, dtype=object).ravel())
     shown = min(len(changes), max_panels, len(panels))

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import new_axes, root_figure
+from tadcore.plotting.tools.axes import as_run, new_axes, root_figure
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
     Axes
         The axes drawn in.
     """
+    as_run(run)
     rows = _rows(run)
     ax = new_axes(ax, COLUMN, max(0.75 + _ROW * max(len(rows), 3) / 72.0, 1.3))
     spans = bars_of(run)

@@ -12,7 +12,7 @@ from tadcore._shared.arrays import Floats
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import above, new_axes
+from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, note
 
@@ -63,6 +63,7 @@ def controls(
     ScenarioError
         The game has no such player or no such axis.
     """
+    as_run(run)
     given = [players] if isinstance(players, str) else run.scenario.constrained if players is None else players
     shown = _known(run, given)
     known_axis(run, axis)
@@ -96,6 +97,7 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
     Axes
         The axes drawn in.
     """
+    as_run(run)
     ax = new_axes(ax, COLUMN, 2.5)
     names = run.scenario.players[:-1]
     curves = dict(zip(names, to_attacker(run), strict=True))
@@ -142,6 +144,7 @@ def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axe
     Axes
         The axes drawn in.
     """
+    as_run(run)
     ax = new_axes(ax, COLUMN, 2.3)
     times = run.times
     # exactly zero where everyone sees everyone, whatever rounding leaves there

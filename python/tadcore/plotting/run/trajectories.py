@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.tools.axes import new_axes
+from tadcore.plotting.tools.axes import as_run, new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
@@ -76,6 +76,7 @@ def trajectories(
     Axes
         The axes drawn in.
     """
+    as_run(run)
     dim = int(run.scenario.dim)
     shown = [run] if full is None else [run, full]
     points = np.concatenate([r.position.reshape(-1, dim) for r in shown])

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._shared.arrays import as_index
+from tadcore.errors import ScenarioError
+
 from .style import COLUMN, PAGE
 
 if TYPE_CHECKING:
@@ -55,6 +58,12 @@ def root_figure(ax: Axes) -> Figure:
     return root
 
 
+def as_run(run: object, field: str = "run") -> None:
+    """Refuse what is no recorded run, before anything of a figure is made."""
+    if not all(hasattr(run, name) for name in ("scenario", "times", "position", "network_changes")):
+        raise ScenarioError(field, run, "a Run, as tadcore.simulate returns it")
+
+
 def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
     """Return ``ax``, or the axes of a new figure of this size in inches."""
     if ax is not None:
@@ -70,7 +79,7 @@ def new_panels(
     The figure is one column wide, two from ``page_from`` panels in a row on. Its height in inches is ``rest`` and
     ``row`` for each row of panels; with ``square`` a row is as much higher as its panels are wide.
     """
-    columns = max(min(columns, count), 1)
+    columns = max(min(as_index("columns", columns, 1000, least=1), count), 1)
     rows = max(-(-count // columns), 1)
     width = PAGE if columns >= page_from else COLUMN
     height = rest + rows * (row + (width / columns if square else 0.0))
