@@ -6,11 +6,12 @@ use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use tadcore::cancel::CancelToken;
 use tadcore::cost::costs;
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, Between, End};
 use tadcore::error::{EquilibriumError, RunError};
 use tadcore::game::{Game, Grid, Interaction, Weights};
+use tadcore::network::EdgeRule;
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{Outcome, Setup, simulate};
+use tadcore::simulation::{Outcome, Setup, Termination, simulate, simulate_with};
 
 /// What the bytes say; nothing of it is checked before the core sees it.
 #[derive(Debug, Arbitrary)]
@@ -127,5 +128,15 @@ fuzz_target!(|input: Input| {
     if let Outcome::Intercepted(i) = record.outcome {
         assert!(i < n, "there is no such defender");
     }
-    assert_eq!(ends.as_deref(), Ok(&[(record.outcome, record.steps)][..]), "the batch ends otherwise");
+    assert_eq!(ends.as_deref(), Ok(&[End::from(&record)][..]), "the batch ends otherwise");
+    let numbers = record.passes.iter().flat_map(|pass| [pass.enters, pass.closest, pass.distance]);
+    assert!(numbers.into_iter().all(|x| x.is_finite() && x >= 0.0), "a pass is not finite");
+    for termination in [Termination::Sampled, Termination::Continuous] {
+        let one = simulate_with(&policy, &setup, &EdgeRule::PAPER, termination, &cancel).expect("a run");
+        let ends = ensemble::run_with(&policy, &batch, Between { termination, passes: true }, Some(1), &cancel);
+        let end = End { passed: !one.passes.is_empty(), ..End::from(&one) };
+        assert_eq!(ends.as_deref(), Ok(&[end][..]), "the batch passes or ends otherwise");
+        // Without a pass the two ends are one, but for the time.
+        assert!(!record.passes.is_empty() || one.outcome == record.outcome, "another end without a pass");
+    }
 });

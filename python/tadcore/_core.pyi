@@ -66,6 +66,7 @@ class Game:
         *,
         hysteresis: float = 0.0,
         dwell: float = 0.0,
+        continuous: bool = False,
     ) -> Record: ...
     def simulate_batch(
         self,
@@ -73,8 +74,11 @@ class Game:
         visibility_radii: NDArray[np.float64],
         capture_radii: NDArray[np.float64],
         *,
+        continuous: bool = False,
+        passes: bool = False,
         threads: int | None = None,
-    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64]]: ...
+    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
+        """Kind, defender, time, and whether it passed within a radius between instants."""
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
     def table_length(self, start: bytes) -> int:
@@ -143,6 +147,9 @@ class Record:
     def time(self) -> float: ...
     @property
     def times(self) -> NDArray[np.float64]: ...
+    @property
+    def passes(self) -> list[tuple[int, float, float, float, float, float]]: ...
+    """Defender (-1 for the target), t_k, t_{k+1}, when a radius is entered, when the two are closest, how close."""
     @property
     def position(self) -> NDArray[np.float64]: ...
     """(L+1, n+2, dim)."""

@@ -78,6 +78,18 @@ MUTANTS = {
         ("J: expansion of z", "«*x *= h / j as f64»", "*x *= -h / j as f64"),
         ("J: Horner", "«*v = *v * s + t»", "*v = *v * s - t"),
     ],
+    "simulation/crossing.rs": [
+        ("crossing: how far a part leaves its chord", "let off = «0.125 * width * width * bend»", "0.0"),
+        ("crossing: what stays clear", "chord.nearest > «radius + chord.off»", "radius"),
+        ("crossing: the first of two roots", "chord.foot «-» inside.sqrt()", "+"),
+        ("crossing: the earlier half first", "self.first(i, reach, «earlier»)", "later"),
+        ("crossing: the nearest point of a chord", "p + share * «(q - p)»", "(p - q)"),
+        ("crossing: growth over two halves", "«half.growth * closed_loop::norm(&half.transition, n).max(1.0)»", "0.0"),
+    ],
+    "simulation/passes.rs": [
+        ("passes: before the one that ends", "take_while(|entry| «Some(entry.0) != ending»)", "true"),
+        ("crossings in the order of time", "«a.1.total_cmp(&b.1)»", "b.1.total_cmp(&a.1)"),
+    ],
     "cost/gramian.rs": [
         ("Gramian: doubling", "w.iter_mut().zip(&next).for_each(|(w, x)| «*w += x»);", "*w -= x"),
         ("Gramian: series", "w.iter_mut().zip(&term).for_each(|(w, x)| «*w += x»);", "*w -= x"),

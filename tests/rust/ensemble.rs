@@ -2,12 +2,12 @@
 //! of axes, threads and table.
 
 use tadcore::cancel::CancelToken;
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, End};
 use tadcore::error::{RunError, TableError};
 use tadcore::game::{Interaction, bank};
 use tadcore::network::Topology;
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{Outcome, Setup, simulate};
+use tadcore::simulation::{Setup, simulate};
 use tadcore::synthesis::{Options, Synthesizer};
 
 /// Numbers in [0, 1), one after another (SplitMix64).
@@ -67,11 +67,11 @@ impl Case {
         Batch { dim: self.dim, positions: &self.positions, visibility: &self.visibility, capture: &self.capture }
     }
 
-    fn play(&self, threads: usize) -> Vec<(Outcome, usize)> {
+    fn play(&self, threads: usize) -> Vec<End> {
         ensemble::run(&self.policy, &self.batch(), Some(threads), &CancelToken::new()).expect("a valid batch")
     }
 
-    fn one_by_one(&self) -> Vec<(Outcome, usize)> {
+    fn one_by_one(&self) -> Vec<End> {
         let game = self.policy.game();
         let row = |all: &'_ [f64], width: usize, i: usize| -> std::ops::Range<usize> {
             let i = if all.len() == width { 0 } else { i };
@@ -86,7 +86,7 @@ impl Case {
                     capture: &self.capture[row(&self.capture, game.size(), i)],
                 };
                 let record = simulate(&self.policy, &setup, &CancelToken::new()).expect("a valid run");
-                (record.outcome, record.steps)
+                End::from(&record)
             })
             .collect()
     }
@@ -101,7 +101,7 @@ fn every_trial_ends_as_it_would_alone() {
                 let case = case(interaction, n, dim, trials, n % 2 == 0, DEFAULT_TABLE_BYTES);
                 let ends = case.play(1);
                 assert_eq!(ends, case.one_by_one(), "{interaction:?} {n} {dim}");
-                kinds.extend(ends.iter().map(|(outcome, k)| (outcome.code(), *k > 0)));
+                kinds.extend(ends.iter().map(|end| (end.outcome.code(), end.step > 0)));
             }
         }
     }

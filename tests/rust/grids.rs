@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use tadcore::cancel::CancelToken;
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, End};
 use tadcore::error::EquilibriumError;
 use tadcore::game::{Game, Grid, Interaction, bank};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
@@ -90,7 +90,7 @@ proptest! {
         let batch = Batch { dim: 2, positions: &far, visibility: &sight, capture: &reach };
         let ends = ensemble::run(&policy, &batch, Some(1), &CancelToken::new()).expect("a batch");
         prop_assert_eq!((run.outcome, run.steps), (Outcome::Timeout, steps));
-        prop_assert_eq!(ends, vec![(Outcome::Timeout, steps)]);
+        prop_assert_eq!(ends, vec![End::from(&run)]);
         let game: &Game = policy.game();
         prop_assert_eq!(game.grid().time(run.steps), horizon);
         let last: Vec<f64> = game.state_weights(true).iter().flat_map(|f| [f[0], 0.0, 0.0, f[1]]).collect();

@@ -2,7 +2,7 @@
 
 use tadcore::cancel::CancelToken;
 use tadcore::cost;
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, End};
 use tadcore::error::{Cancelled, RunError};
 use tadcore::game::bank::{self, Setup as Start};
 use tadcore::game::{Game, Interaction};
@@ -139,7 +139,7 @@ fn batches_are_runs_whatever_the_threads_and_the_budget() {
     assert_eq!(one, bounded);
     let stats = small.table();
     assert!(stats.bytes <= 100_000 && stats.entries > 0, "{stats:?}");
-    for (i, &(outcome, steps)) in one.iter().enumerate() {
+    for (i, &End { outcome, step: steps, .. }) in one.iter().enumerate() {
         let setup = Setup {
             dim: 2,
             positions: &positions[i * 10..(i + 1) * 10],
@@ -149,7 +149,7 @@ fn batches_are_runs_whatever_the_threads_and_the_budget() {
         let record = simulate(&large, &setup, &cancel).expect("a run");
         assert_eq!((record.outcome, record.steps), (outcome, steps), "trial {i}");
     }
-    let kinds: std::collections::HashSet<i8> = one.iter().map(|(o, _)| o.code()).collect();
+    let kinds: std::collections::HashSet<i8> = one.iter().map(|end| end.outcome.code()).collect();
     assert!(kinds.len() >= 2, "the sample should end in more than one way");
 }
 

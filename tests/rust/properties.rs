@@ -6,11 +6,11 @@
 use proptest::prelude::*;
 use tadcore::cancel::CancelToken;
 use tadcore::cost::costs;
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, Between, End};
 use tadcore::game::{Game, Grid, Interaction, Weights};
-use tadcore::network::Topology;
+use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{Record, Setup, simulate};
+use tadcore::simulation::{Outcome, Record, Setup, Termination, simulate, simulate_with};
 use tadcore::synthesis::Synthesizer;
 
 /// A game and a start, before anything is solved.
@@ -195,7 +195,39 @@ proptest! {
         let ends = ensemble::run(&policy, &batch, Some(threads), &CancelToken::new()).expect("a valid batch");
         for (end, positions) in ends.iter().zip(moved) {
             let alone = Drawn { positions, ..drawn.clone() }.run(&policy);
-            prop_assert_eq!(*end, (alone.outcome, alone.steps));
+            prop_assert_eq!(*end, End::from(&alone));
+        }
+    }
+
+    /// Between instants, too, a game in a batch is what it is alone; a continuous end is on the rim of its radius.
+    #[test]
+    fn a_batch_passes_and_ends_as_its_single_runs(drawn in drawn(6), shifts in prop::collection::vec(-0.5..0.5_f64, 1..20), threads in 1..4_usize) {
+        let Some(policy) = drawn.policy() else { return Ok(()) };
+        let moved: Vec<Vec<f64>> = shifts
+            .iter()
+            .map(|s| drawn.positions.iter().enumerate().map(|(e, x)| 0.3 * x + s * (e as f64).cos()).collect())
+            .collect();
+        let (all, none, n) = (moved.concat(), CancelToken::new(), drawn.game.n());
+        // Radii that are small beside a step are entered and left within one.
+        let capture: Vec<f64> = drawn.capture.iter().map(|sigma| 0.05 * sigma).collect();
+        let drawn = Drawn { capture, ..drawn };
+        let Drawn { dim, visibility, capture, .. } = &drawn;
+        let batch = Batch { dim: *dim, positions: &all, visibility, capture };
+        for termination in [Termination::Sampled, Termination::Continuous] {
+            let between = Between { termination, passes: true };
+            let ends = ensemble::run_with(&policy, &batch, between, Some(threads), &none).expect("a valid batch");
+            for (end, positions) in ends.iter().zip(&moved) {
+                let one = Drawn { positions: positions.clone(), ..drawn.clone() };
+                let alone = simulate_with(&policy, &one.setup(), &EdgeRule::PAPER, termination, &none).expect("a run");
+                prop_assert_eq!(*end, End { passed: !alone.passes.is_empty(), ..End::from(&alone) });
+                prop_assert!(alone.passes.is_empty() || termination == Termination::Sampled);
+                if alone.after > 0.0 {
+                    let row = if let Outcome::Intercepted(i) = alone.outcome { i } else { n };
+                    let last = &alone.positions[alone.steps * (n + 2) * dim..];
+                    let z: f64 = (0..*dim).map(|x| (last[row * dim + x] - last[(n + 1) * dim + x]).powi(2)).sum();
+                    prop_assert!((z.sqrt() - capture[row]).abs() < 1e-12, "{} {}", z.sqrt(), capture[row]);
+                }
+            }
         }
     }
 

@@ -25,6 +25,10 @@ def simulate(
         typer.Option(metavar="DIR", help="Write run.nc, scenario.toml and summary.json there; or one file, FILE.nc."),
     ] = None,
     plot: Annotated[bool, typer.Option("--plot", help="Draw the run: into DIR, or in windows.")] = False,
+    termination: Annotated[
+        str,
+        typer.Option(metavar="WHEN", help="sampled: at an instant of the grid; continuous: at the crossing itself."),
+    ] = "sampled",
 ) -> None:
     """Play a scenario: print how it ends and when the network changes.
 
@@ -46,9 +50,11 @@ def simulate(
         usable(out)
     if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
+    from tadcore.simulation.passes import as_termination
     from tadcore.simulation.run import simulate as play
 
-    run = play(sc)
+    when = as_termination(termination)
+    run = play(sc) if when == "sampled" else play(sc, termination=when)
     for line in _lines(run):
         say(line)
     if out is not None:
@@ -96,7 +102,9 @@ def validate(
 def _lines(run: Any, most: int = 20) -> list[str]:
     """The outcome, then one line for each change of the network."""
     changes = run.network_changes
-    lines = [str(run.outcome), "network:"]
+    passes = [f"between instants: {each}" for each in run.passes[:most]]
+    passes += [f"  … and {len(run.passes) - most} more passes"] if len(run.passes) > most else []
+    lines = [str(run.outcome), *passes, "network:"]
     for change in changes[:most]:
         edges = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
         lines.append(f"  t = {change.time:<8.10g} {'  '.join(edges) or 'no edges'}")

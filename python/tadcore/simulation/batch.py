@@ -13,6 +13,7 @@ from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, OutcomeKind
 from tadcore.scenario.model import Scenario
 
+from .passes import Termination, as_termination
 from .rules import capture_rows, compare, visibility_rows
 
 if TYPE_CHECKING:
@@ -33,11 +34,15 @@ class Batch:
         The intercepting defender, 0-based; -1 where none intercepted.
     time : ndarray of float64, shape (M,)
         The instant of the end.
+    passed : ndarray of bool, shape (M,), or None
+        Whether a capture radius was entered between two instants, before the one that ended the game: with continuous
+        termination the game would end there. None where that was not asked for.
     """
 
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
     time: Floats
+    passed: NDArray[np.bool_] | None = None
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way."""
@@ -52,14 +57,18 @@ class Batch:
     def __getitem__(self, index: slice) -> Batch: ...
     def __getitem__(self, index: int | slice) -> Outcome | Batch:
         if isinstance(index, slice):
-            return Batch(self.kind[index], self.defender[index], self.time[index])
+            passed = None if self.passed is None else self.passed[index]
+            return Batch(self.kind[index], self.defender[index], self.time[index], passed)
         return Outcome.of(int(self.kind[index]), int(self.defender[index]), float(self.time[index]))
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[i] for i in range(len(self)))
 
     def __repr__(self) -> str:
-        return f"Batch({len(self):,} games: {', '.join(f'{count:,} {name}' for name, count in self.counts().items())})"
+        counts = ", ".join(f"{count:,} {name}" for name, count in self.counts().items())
+        many = 0 if self.passed is None else int(np.count_nonzero(self.passed))
+        passed = f"; {many:,} passed within a capture radius between two instants" if many else ""
+        return f"Batch({len(self):,} games: {counts}{passed})"
 
 
 def simulate_batch(
@@ -68,6 +77,9 @@ def simulate_batch(
     visibility_radii: ArrayLike | None = None,
     capture_radii: ArrayLike | None = None,
     threads: int | None = None,
+    *,
+    termination: Termination = "sampled",
+    passes: bool = False,
 ) -> Batch:
     """Play M games that share the scenario's weights, horizon and step.
 
@@ -86,16 +98,22 @@ def simulate_batch(
         σ, ordered d1 … dn, attacker.
     threads : int, optional
         Worker threads; all cores by default.
+    termination : {"sampled", "continuous"}
+        When a game ends: at an instant of the grid, or at the crossing of a capture radius itself; see
+        `tadcore.simulate`.
+    passes : bool
+        Whether to look for games that enter a capture radius between two instants: `Batch.passed`.
 
     Returns
     -------
     Batch
-        ``kind``, ``defender`` and ``time``, each of length M.
+        ``kind``, ``defender``, ``time`` and, where asked for, ``passed``, each of length M.
 
     Raises
     ------
     ScenarioError
-        A shape or an entry breaks a rule; the field is named as in ``positions[17, 2, 0]``.
+        A shape or an entry breaks a rule, or ``termination`` is neither of the two; the field is named as in
+        ``positions[17, 2, 0]``.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
 
@@ -113,5 +131,9 @@ def simulate_batch(
     capture = capture_rows(sc, capture_radii, len(starts))
     compare(starts, capture, sight, sc.n)
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
-    kind, defender, time = game_of(sc).simulate_batch(starts, sight, capture, threads=workers)
-    return Batch(kind, defender, time)
+    continuous = as_termination(termination) == "continuous"
+    game = game_of(sc)
+    kind, defender, time, passed = game.simulate_batch(
+        starts, sight, capture, continuous=continuous, passes=bool(passes), threads=workers
+    )
+    return Batch(kind, defender, time, passed if passes else None)

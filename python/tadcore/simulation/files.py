@@ -22,6 +22,9 @@ from tadcore.game.recorded import Recorded
 from tadcore.game.synthesis import theta_terms
 from tadcore.scenario.provenance import provenance
 
+from .passes import Pass, Termination
+from .variants import Variant, told
+
 SUFFIX = ".nc"
 RECORD = "run"
 """The attribute with all of a run that its dataset does not have."""
@@ -35,20 +38,16 @@ VARIABLES = {"times": "time", "gains": "gain"}
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
 
 
-class Written(Recorded, Protocol):
+class Written(Recorded, Variant, Protocol):
     """What a file tells of a run beyond its arrays; `tadcore.Run` has it."""
 
     @property
-    def variant(self) -> str:
-        """What sets it apart from the paper's game; empty where nothing does."""
-
-    @property
-    def hysteresis(self) -> float:
+    def termination(self) -> Termination:
         """See `tadcore.simulate`."""
 
     @property
-    def dwell(self) -> float:
-        """See `tadcore.simulate`."""
+    def passes(self) -> tuple[Pass, ...]:
+        """Capture radii entered between two instants."""
 
     @property
     def costs(self) -> dict[str, float]:
@@ -129,9 +128,10 @@ def variant_of(run: Written) -> dict[str, Any]:
     if not run.variant:
         return {}
     return {
-        "variant": f"not the paper's game: edges with {run.variant}",
+        "variant": f"not the paper's game: {told(run)}",
         "hysteresis": run.hysteresis,
         "dwell": run.dwell,
+        "termination": run.termination,
     }
 
 
@@ -150,6 +150,7 @@ def summary_of(run: Written) -> dict[str, Any]:
             "text": str(run.outcome),
         },
         **variant_of(run),
+        "passes": [dataclasses.asdict(each) for each in run.passes],
         "network_changes": [
             {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
         ],

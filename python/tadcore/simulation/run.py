@@ -22,6 +22,9 @@ from tadcore.game.outcome import Outcome
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
 
+from .passes import Pass, Termination, as_termination
+from .variants import told
+
 if TYPE_CHECKING:
     import os
 
@@ -63,6 +66,11 @@ class Run:
         Steps of the synthesis solver, all instants together.
     unconverged : int
         Instants at which the synthesis stopped short of its tolerance.
+    passes : tuple of Pass
+        Capture radii entered between two instants, where termination is not tested, in the order of time; empty with
+        continuous termination.
+    termination : {"sampled", "continuous"}
+        When the game ends, see `simulate`.
     certified : int
         Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
@@ -84,12 +92,15 @@ class Run:
     certified: int
     hysteresis: float = 0.0
     dwell: float = 0.0
+    passes: tuple[Pass, ...] = ()
+    termination: Termination = "sampled"
 
     @property
     def variant(self) -> str:
         """What sets this run apart from the paper's game, in words; empty where nothing does."""
         named = {"hysteresis": self.hysteresis, "dwell": self.dwell}
-        return " and ".join(f"{name} {value:g}" for name, value in named.items() if value > 0.0)
+        words = [f"{name} {value:g}" for name, value in named.items() if value > 0.0]
+        return " and ".join([*words, *(["continuous termination"] if self.termination == "continuous" else [])])
 
     @property
     def converged(self) -> bool:
@@ -187,11 +198,17 @@ class Run:
         warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
         edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
         chattering = f", chattering: {', '.join(edges)}" if edges else ""
-        other = f"; a variant, edges with {self.variant}" if self.variant else ""
+        other = f"; a variant, {told(self)}" if self.variant else ""
+        other += f"; {_passed(self.passes)}" if self.passes else ""
         return f"Run({self.scenario.interaction}: {self.outcome}; {network}{chattering}{warning}{other})"
 
 
-def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Run:
+def _passed(passes: tuple[Pass, ...]) -> str:
+    more = f" and {len(passes) - 1} times more" if len(passes) > 1 else ""
+    return f"{passes[0]}{more}"
+
+
+def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0, termination: Termination = "sampled") -> Run:
     """Play a scenario and record everything.
 
     Parameters
@@ -208,6 +225,12 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Ru
         Either makes it *another game than the paper's*, in which an edge must be there exactly when the distance is at
         most ζ (eq:limob); the run says so. Batches and studies have no such variant.
 
+    termination : {"sampled", "continuous"}
+        When the game ends: at the first instant of the grid at which somebody is within a capture radius, which is the
+        definition; or at the first crossing of a capture radius, at its own time between two instants. The motion
+        within a step is known exactly, so nothing is missed. Feedback and network are those of the grid either way, so
+        the two games are bitwise the same up to the end. The last row of the record is then the state at the crossing.
+
     Returns
     -------
     Run
@@ -218,7 +241,7 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Ru
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     ScenarioError
-        `hysteresis` or `dwell` is negative or not finite.
+        `hysteresis` or `dwell` is negative or not finite, or `termination` is neither of the two.
 
     Examples
     --------
@@ -230,7 +253,10 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Ru
     [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
     """
     rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
-    record = game_of(sc).simulate(sc.positions, sc.visibility_radii, sc.capture_radii, **rule)
+    ending = as_termination(termination)
+    continuous = ending == "continuous"
+    game, sight, reach = game_of(sc), sc.visibility_radii, sc.capture_radii
+    record = game.simulate(sc.positions, sight, reach, **rule, continuous=continuous)
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
         scenario=sc,
@@ -247,4 +273,6 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0) -> Ru
         unconverged=record.unconverged,
         certified=record.certified,
         **rule,
+        passes=tuple(Pass(None if who < 0 else who, *rest) for who, *rest in record.passes),
+        termination=ending,
     )

@@ -113,6 +113,7 @@ def incidence(
     level: float = 0.95,
     jointly: bool = False,
     looks: int = 0,
+    between: bool = False,
 ) -> Incidence:
     """Estimate the cumulative incidence of each outcome.
 
@@ -133,6 +134,9 @@ def incidence(
     looks : int
         How often a rule was asked whether to stop, the last time included; 0 where the number of trials was fixed
         beforehand.
+    between : bool
+        Whether games may end between instants, as with ``termination="continuous"``. A curve then counts at each
+        instant what has ended by then.
 
     Returns
     -------
@@ -155,7 +159,7 @@ def incidence(
     confidence = as_level(level)
     times = _grid(as_amount("horizon", horizon), step, n)
     steps = len(times) - 1
-    at = _instants(time, len(codes), horizon, steps)
+    at = _instants(time, len(codes), horizon, steps, between=between)
     names = outcome_names(n)
     ended = np.zeros((len(names), steps + 1), dtype=np.int64)
     np.add.at(ended, (codes, at), 1)
@@ -211,6 +215,7 @@ def incidence_of(result: TrialOutcomes, *, level: float | None = None, jointly: 
         level=level_of(stopping, level),
         jointly=jointly,
         looks=0 if stopping is None else stopping.looks(result.trials),
+        between=getattr(result, "termination", "sampled") == "continuous",
     )
     return found if stopping is None else replace(found, rule=str(stopping))
 
@@ -235,14 +240,19 @@ def _grid(horizon: float, step: float, n: int) -> Floats:
     return _core.grid_times(horizon, step)
 
 
-def _instants(time: ArrayLike, trials: int, horizon: float, steps: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """The number k of each instant t_k."""
+def _instants(
+    time: ArrayLike, trials: int, horizon: float, steps: int, *, between: bool
+) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """The number k of each instant t_k, or of the first one at or after each time."""
     times = as_real("time", time, "an array of instants")
     if times.shape != (trials,):
         raise ScenarioError("time", f"shape {times.shape}", f"of shape ({trials},), one instant for each trial")
     count = times / horizon * steps
+    rounding = max(_OFF_GRID, 1e-15 * steps)
     with np.errstate(invalid="ignore"):
-        good = np.abs(count - np.rint(count)) <= max(_OFF_GRID, 1e-15 * steps)
+        if between:
+            count = np.ceil(count - rounding)
+        good = np.abs(count - np.rint(count)) <= rounding
         good &= (count > -0.5) & (count < steps + 0.5)
     rule = f"a multiple of the step ({horizon / steps!r}) between 0 and the horizon ({horizon!r})"
     refuse_where("time", times, ~good, rule)

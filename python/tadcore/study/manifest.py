@@ -20,6 +20,7 @@ from tadcore._shared.files import MOST, strange
 from tadcore.errors import StoreError, shorten
 from tadcore.sampling.adapters import as_plain, from_plain
 from tadcore.sampling.design import CHUNK, STREAM
+from tadcore.simulation.passes import Termination, as_termination
 
 Kind = TypeVar("Kind")
 
@@ -55,6 +56,8 @@ class Manifest:
         The rule that was asked, whether it held or not: how it prints, and its level.
     columns : tuple of str
         Names of the inputs.
+    termination : {"sampled", "continuous"}
+        When a game ends; written where it is not the sampled definition.
     version, created : str
         The version of this library, and when the store was made (UTC).
     environment : dict of str to str
@@ -69,6 +72,7 @@ class Manifest:
     columns: tuple[str, ...]
     stopped: int | None = None
     rule: dict[str, Any] | None = None
+    termination: Termination = "sampled"
     chunk: int = CHUNK
     stream: int = STREAM
     version: str = _core.__version__
@@ -78,7 +82,8 @@ class Manifest:
     @property
     def study(self) -> str:
         """Digest of everything that decides an outcome: scenario, vary, seed, design, chunk and stream."""
-        decides = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
+        decides: list[object] = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
+        decides += [self.termination] if self.termination != "sampled" else []
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def to_json(self) -> str:
@@ -99,6 +104,7 @@ class Manifest:
             "columns": list(self.columns),
             "vary": as_plain(self.vary),
             "scenario": self.scenario,
+            **({"termination": self.termination} if self.termination != "sampled" else {}),
         }
         if self.rule is not None:
             content["rule"] = self.rule
@@ -141,6 +147,7 @@ class Manifest:
                 design=_entry(content, "design", str),
                 trials=_whole(content, "trials"),
                 columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
+                termination=as_termination(content.get("termination", "sampled")),
                 stopped=None if content["stopped"] is None else _whole(content, "stopped"),
                 rule=_entry(content, "rule", dict) if "rule" in content else None,
                 chunk=_whole(content, "chunk"),

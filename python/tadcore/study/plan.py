@@ -19,6 +19,7 @@ from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
+from tadcore.simulation.passes import Termination
 from tadcore.simulation.rules import extents_of
 
 from .vary import quantities
@@ -42,6 +43,7 @@ class Plan:
     vary: dict[str, Sampler]
     seed: int
     design: Design
+    termination: Termination = "sampled"
 
     @cached_property
     def varied(self) -> tuple[tuple[Quantity, Sampler], ...]:
@@ -126,14 +128,22 @@ class Plan:
         inputs = self.draw(chunk, rows)
         self.check(chunk, inputs)
         positions, sight, capture = setups(self.scenario, self.quantities, inputs)
-        batch = simulate_batch(self.scenario, positions, sight, capture, threads=threads)
+        radii = sight, capture
+        batch = simulate_batch(self.scenario, positions, *radii, threads=threads, termination=self.termination)
         return Outcomes(batch.kind, batch.defender, batch.time, inputs)
 
 
 def run_chunk(
-    scenario: str, vary: dict[str, Sampler], seed: int, design: Design, chunk: int, rows: int, threads: int | None
+    scenario: str,
+    vary: dict[str, Sampler],
+    seed: int,
+    design: Design,
+    termination: Termination,
+    chunk: int,
+    rows: int,
+    threads: int | None,
 ) -> Outcomes:
     """`Plan.run` in another process, from the scenario's TOML; the process keeps its table from chunk to chunk."""
     from tadcore.scenario.model import Scenario
 
-    return Plan(Scenario.from_toml_string(scenario), vary, seed, design).run(chunk, rows, threads)
+    return Plan(Scenario.from_toml_string(scenario), vary, seed, design, termination).run(chunk, rows, threads)

@@ -85,7 +85,7 @@ class Store:
         if not whole:
             raise StoreError(str(path), "it is damaged (its rows are not those that were written)", _AGAIN)
         # A digest tells an accident, not an intention: what cannot be an outcome is none, whatever is said of it.
-        found = flaw(table, chunk, self.plan.scenario)
+        found = flaw(table, chunk, self.plan.scenario, self.plan.termination)
         if found is None:
             try:
                 self.plan.check(chunk, np.stack([table[name].to_numpy() for name in self.plan.columns], axis=1))

@@ -42,6 +42,7 @@ from tadcore.sampling.design import DESIGNS, Design
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity, setups
+from tadcore.simulation.passes import Termination, as_termination
 from tadcore.simulation.run import Run, simulate
 from tadcore.statistics.stopping import Stopping, from_kept
 
@@ -74,6 +75,10 @@ class Study:
         Any whole number in [0, 2⁶⁴); adjacent seeds share nothing.
     design : {"random", "sobol", "latin"}
         Independent draws, a scrambled Sobol' sequence, or Latin hypercubes (one for every chunk of 8,192 trials).
+
+    termination : {"sampled", "continuous"}
+        When a game ends: at an instant of the grid, or at the crossing of a capture radius itself; see
+        `tadcore.simulate`. A store of one is not taken for a store of the other.
 
     Raises
     ------
@@ -108,6 +113,7 @@ class Study:
         trials: int,
         seed: int = 0,
         design: Design = "random",
+        termination: Termination = "sampled",
     ) -> None:
         if not isinstance(sc, Scenario):
             raise ScenarioError("sc", sc, "a tadcore.Scenario")
@@ -124,7 +130,8 @@ class Study:
             if name in samplers:
                 raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
             samplers[name] = as_sampler(f'vary["{path}"]', value)
-        self._plan = Plan(sc, samplers, as_index("seed", seed, 2**64 - 1), design)
+        key = as_index("seed", seed, 2**64 - 1)
+        self._plan = Plan(sc, samplers, key, design, as_termination(termination))
         for quantity, sampler in self._plan.varied:
             if design != "random" and not sampler.by_points:
                 rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
@@ -149,6 +156,11 @@ class Study:
     def design(self) -> Design:
         """The design of the draws."""
         return self._plan.design
+
+    @property
+    def termination(self) -> Termination:
+        """When a game ends."""
+        return self._plan.termination
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -188,9 +200,10 @@ class Study:
         self._plan.check_ahead(self.trials, progress=progress)
 
     def replace(self, **changes: Any) -> Study:
-        """Another study with some of ``sc``, ``vary``, ``trials``, ``seed`` and ``design`` changed."""
+        """Another study with some of the arguments changed."""
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
-        return Study(**{"sc": self.scenario, "design": self.design, **given, **changes})
+        given |= {"design": self.design, "termination": self.termination}
+        return Study(**{"sc": self.scenario, **given, **changes})
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> Study:
@@ -287,6 +300,7 @@ class Study:
             design=self.design,
             trials=self.trials,
             columns=self.columns,
+            termination=self.termination,
         )
 
     def __repr__(self) -> str:
@@ -314,7 +328,7 @@ class StudyResult(Trials):
     """
 
     def __init__(self, study: Study, table: pa.Table, stopping: Stopping | None = None) -> None:
-        super().__init__(study.scenario, study.seed, table, stopping)
+        super().__init__(study.scenario, study.seed, table, stopping, study.termination)
         object.__setattr__(self, "study", study)
 
     study: Study
@@ -360,7 +374,7 @@ class StudyResult(Trials):
         ScenarioError
             There is no such trial.
         """
-        return simulate(self.setup(trial))
+        return simulate(self.setup(trial), termination=self.termination)
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> StudyResult:
@@ -408,6 +422,7 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
         trials=manifest.trials,
         seed=manifest.seed,
         design=manifest.design,  # type: ignore[arg-type]  # the constructor checks it
+        termination=manifest.termination,
     )
     store = Store.reading(folder, manifest, study._plan)
     wanted = manifest.trials if manifest.stopped is None else manifest.stopped

@@ -26,6 +26,7 @@ from tadcore import _core
 from tadcore.game.outcome import OutcomeKind
 from tadcore.sampling.design import CHUNK
 from tadcore.scenario.model import Scenario
+from tadcore.simulation.passes import Termination
 
 from .plan import Outcomes, Plan
 
@@ -103,13 +104,14 @@ def table_of(chunk: int, outcomes: Outcomes, plan: Plan, schema: pa.Schema) -> p
     return pa.Table.from_arrays([pa.array(array) for array in arrays], schema=schema)
 
 
-def flaw(table: pa.Table, chunk: int, sc: Scenario) -> str | None:
+def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "sampled") -> str | None:
     """What no study could have written, in words; None where every row of a chunk can be how a game ended."""
     first = chunk * CHUNK
     kind, defender, time = (table[name].to_numpy() for name in ("kind", "defender", "time"))
     with np.errstate(invalid="ignore"):
-        steps = time / sc.horizon * round(sc.horizon / sc.step)
-        on_grid = np.abs(steps - np.round(steps)) <= 1e-6
+        count = time / sc.horizon * sc.steps  # δ may differ from T / K in the last digits
+        on_grid = np.abs(count - np.round(count)) <= max(1e-6, 1e-15 * sc.steps)
+    on_grid |= termination == "continuous"
     within = (time >= 0.0) & (time <= sc.horizon * (1.0 + 1e-9))
     last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon)
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
@@ -117,11 +119,12 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario) -> str | None:
     same = pc.equal(
         pc.cast(table["outcome"], pa.string()), pc.cast(_outcome(kind * known, one * defender, sc), pa.string())
     )
+    when = "a time" if termination == "continuous" else "an instant of the grid"
     rules = {
         "trial": (table["trial"].to_numpy() == np.arange(first, first + len(kind)), "the number of its row"),
         "kind": (known, "a code of tadcore.OutcomeKind"),
         "defender": (one, "a defender where one intercepted, and -1 elsewhere"),
-        "time": (on_grid & within & last, f"an instant of the grid up to T = {sc.horizon:g}, for a timeout T itself"),
+        "time": (on_grid & within & last, f"{when} up to T = {sc.horizon:g}, for a timeout T itself"),
         "outcome": (same.to_numpy(), "what kind and defender say"),
     }
     for name, (holds, rule) in rules.items():

@@ -14,6 +14,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath
+from tadcore.simulation.passes import Termination
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
 from tadcore.statistics.stopping import Stopping
 
@@ -32,6 +33,7 @@ class Trials:
     seed: int
     table: pa.Table
     stopping: Stopping | None = None
+    termination: Termination = "sampled"
 
     @property
     def trials(self) -> int:

@@ -87,7 +87,7 @@ def verify(
     if bound:
         require_clarabel()
     if isinstance(sc_or_run, Run) and sc_or_run.variant:
-        raise ScenarioError("sc_or_run", f"a run with {sc_or_run.variant}", "a run of the paper's game, without either")
+        raise ScenarioError("sc_or_run", f"a run with {sc_or_run.variant}", "a run of the paper's game, without any")
     sc = sc_or_run if isinstance(sc_or_run, Scenario) else sc_or_run.scenario
     try:
         run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run

@@ -6,11 +6,11 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use tadcore::ensemble::{self, Batch};
+use tadcore::ensemble::{self, Batch, Between};
 use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{self, Setup};
+use tadcore::simulation::{self, Setup, Termination};
 use tadcore::synthesis::{Method, Options, Synthesizer};
 
 use super::arrays::{copied, entries};
@@ -31,6 +31,10 @@ pub(crate) struct Game {
 
 fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
     array.map(|a| a.as_array().iter().copied().collect()).unwrap_or_default()
+}
+
+fn termination(continuous: bool) -> Termination {
+    if continuous { Termination::Continuous } else { Termination::Sampled }
 }
 
 impl Game {
@@ -172,7 +176,9 @@ impl Game {
     }
 
     /// One recorded run; with a hysteresis or a dwell time another game than the paper's.
-    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0))]
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0, continuous=false))]
+    // A keyword for each rule.
+    #[allow(clippy::too_many_arguments)]
     fn simulate(
         &self,
         py: Python<'_>,
@@ -181,6 +187,7 @@ impl Game {
         capture_radii: PyReadonlyArray1<'_, f64>,
         hysteresis: f64,
         dwell: f64,
+        continuous: bool,
     ) -> PyResult<Record> {
         guarded(|| {
             let dim = positions.as_array().ncols();
@@ -189,24 +196,38 @@ impl Game {
             let policy = self.policy(py)?;
             let record = detach::interruptible(py, |cancel| {
                 let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
-                simulation::simulate_with(&policy, &setup, &EdgeRule { hysteresis, dwell }, cancel)
+                simulation::simulate_with(
+                    &policy,
+                    &setup,
+                    &EdgeRule { hysteresis, dwell },
+                    termination(continuous),
+                    cancel,
+                )
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
             Ok(Record::new(policy, record))
         })
     }
 
-    /// Outcomes of many runs: kind, defender, time.
-    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, threads=None))]
-    #[allow(clippy::type_complexity)]
+    /// Outcomes of many runs: kind, defender, time, and whether it passed within a radius.
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, continuous=false, passes=false, threads=None))]
+    // A keyword for each rule.
+    #[allow(clippy::type_complexity, clippy::too_many_arguments)]
     fn simulate_batch<'py>(
         &self,
         py: Python<'py>,
         positions: PyReadonlyArray3<'py, f64>,
         visibility_radii: PyReadonlyArray2<'py, f64>,
         capture_radii: PyReadonlyArray2<'py, f64>,
+        continuous: bool,
+        passes: bool,
         threads: Option<usize>,
-    ) -> PyResult<(Bound<'py, PyArray1<i8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<(
+        Bound<'py, PyArray1<i8>>,
+        Bound<'py, PyArray1<i32>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<bool>>,
+    )> {
         guarded(|| {
             let dim = positions.as_array().dim().2;
             let positions = copied(py, &positions)?;
@@ -214,14 +235,16 @@ impl Game {
             let policy = self.policy(py)?;
             let ends = detach::interruptible(py, |cancel| {
                 let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
-                ensemble::run(&policy, &batch, threads, cancel)
+                let between = Between { termination: termination(continuous), passes };
+                ensemble::run_with(&policy, &batch, between, threads, cancel)
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
             let grid = self.game.grid();
             Ok((
-                entries(py, ends.len(), |i| ends[i].0.code())?,
-                entries(py, ends.len(), |i| ends[i].0.defender())?,
-                entries(py, ends.len(), |i| grid.time(ends[i].1))?,
+                entries(py, ends.len(), |i| ends[i].outcome.code())?,
+                entries(py, ends.len(), |i| ends[i].outcome.defender())?,
+                entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
+                entries(py, ends.len(), |i| ends[i].passed)?,
             ))
         })
     }

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use tadcore::cost;
 use tadcore::policy::Policy;
-use tadcore::simulation::Record as CoreRecord;
+use tadcore::simulation::{Pass, Record as CoreRecord};
 
 use super::arrays::{entries, shaped};
 use super::guard::guarded;
@@ -50,13 +50,27 @@ impl Record {
     /// Time of termination.
     #[getter]
     fn time(&self) -> f64 {
-        self.policy.game().grid().time(self.record.steps)
+        self.record.time(self.policy.game().grid())
+    }
+
+    /// Capture radii entered between two instants: defender (-1 for the target), t_k, t_{k+1}, when it is entered, when
+    /// the two are closest, how close.
+    #[getter]
+    fn passes(&self) -> Vec<(i32, f64, f64, f64, f64, f64)> {
+        let (grid, n) = (self.policy.game().grid(), self.policy.game().n());
+        let within = |pass: &Pass, s: f64| grid.time_after(pass.step, s);
+        let told = |pass: &Pass| {
+            let who = if pass.row < n { i32::try_from(pass.row).unwrap_or(i32::MAX) } else { -1 };
+            let (start, end) = (grid.time(pass.step), grid.time(pass.step + 1));
+            (who, start, end, within(pass, pass.enters), within(pass, pass.closest), pass.distance)
+        };
+        self.record.passes.iter().map(told).collect()
     }
 
     /// Times of the rows.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        guarded(|| entries(py, self.rows(), |k| self.policy.game().grid().time(k)))
+        guarded(|| entries(py, self.rows(), |i| self.record.time_of(i, self.policy.game().grid())))
     }
 
     /// Positions, shape (L + 1, n + 2, dim).

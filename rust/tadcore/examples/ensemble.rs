@@ -36,8 +36,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let began = Instant::now();
         let ends = ensemble::run(&policy, &batch, Some(threads), &cancel)?;
         let seconds = began.elapsed().as_secs_f64();
-        let count = |wanted: fn(&Outcome) -> bool| ends.iter().filter(|(outcome, _)| wanted(outcome)).count();
-        let steps: usize = ends.iter().map(|&(_, k)| k).sum();
+        let count = |wanted: fn(&Outcome) -> bool| ends.iter().filter(|end| wanted(&end.outcome)).count();
+        let steps: usize = ends.iter().map(|end| end.step).sum();
         println!(
             "{table}: {} intercepted, {} captured, {} out of time; {:.0} trials/s, {:.2} ns a trial-step; {:?}",
             count(|o| matches!(o, Outcome::Intercepted(_))),

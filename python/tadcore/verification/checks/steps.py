@@ -1,9 +1,11 @@
 """What depends on δ: the outcome, its time, the network changes, and edges that chatter.
 
-Termination, network and gains are looked at on the grid, so every time in a result is a multiple of δ. An event of the
-continuous game lies up to a step before it, and a graze can be missed. And where the control with an edge drives two
-players apart and the control without it brings them back, the edge flips at almost every instant: a sliding mode of the
-continuous game. `tadcore.verification.play_by_events` follows both in continuous time.
+Termination, network and gains are looked at on the grid, so every time in a result is a multiple of δ. A crossing of a
+capture radius lies up to a step before it; one that is left again before the next instant is a pass, which changes the
+outcome of the continuous game and at a smaller step that of the sampled one (`tadcore.simulation.Pass`). And where the
+control with an edge drives two players apart and the control without it brings them back, the edge flips at almost
+every instant: a sliding mode of the continuous game. `tadcore.verification.play_by_events` follows both in continuous
+time.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import Outcome
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.batch import simulate_batch
+from tadcore.simulation.passes import Pass
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
@@ -40,25 +43,38 @@ class StepStudy:
         Network changes after the first network, with each.
     chatter : tuple of tuple of Chatter
         The stretches of chattering, with each.
+    passes : tuple of tuple of Pass
+        Capture radii entered between two instants, with each.
     """
 
     steps: tuple[float, ...]
     outcomes: tuple[Outcome, ...]
     changes: tuple[int, ...]
     chatter: tuple[tuple[Chatter, ...], ...]
+    passes: tuple[tuple[Pass, ...], ...]
 
     @property
     def stable(self) -> bool:
-        """Whether the same side wins, by the same defender, at every step, and its time moves by at most a step."""
+        """Whether the same side wins, by the same defender, at every step, and its time moves by at most a step.
+
+        Not where a capture radius is entered between two instants: at another step the game can end there.
+        """
         ends = {(outcome.kind, outcome.defender) for outcome in self.outcomes}
         moves = [abs(b.time - a.time) for a, b in zip(self.outcomes, self.outcomes[1:], strict=False)]
-        return len(ends) == 1 and all(m <= 1.01 * d for m, d in zip(moves, self.steps, strict=False))
+        return (
+            not any(self.passes)
+            and len(ends) == 1
+            and all(m <= 1.01 * d for m, d in zip(moves, self.steps, strict=False))
+        )
 
     def __repr__(self) -> str:
         lines = [f"StepStudy: {'stable' if self.stable else 'NOT stable'} under refinement"]
-        for step, outcome, changes, found in zip(self.steps, self.outcomes, self.changes, self.chatter, strict=True):
+        rows = zip(self.steps, self.outcomes, self.changes, self.chatter, self.passes, strict=True)
+        for step, outcome, changes, found, passed in rows:
             loud = f", {len(found)} stretches of chatter" if found else ""
             lines.append(f"  δ = {step:<10.6g} {outcome}; {changes} network changes{loud}")
+            lines += [f"    {each}" for each in passed[:_SHOWN]]
+            lines += [f"    and {len(passed) - _SHOWN} times more"] if len(passed) > _SHOWN else []
         return "\n".join(lines)
 
 
@@ -112,6 +128,7 @@ def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:
         outcomes=tuple(run.outcome for run in runs),
         changes=tuple(max(len(run.network_changes) - 1, 0) for run in runs),
         chatter=tuple(chatter(run) for run in runs),
+        passes=tuple(run.passes for run in runs),
     )
 
 
@@ -148,7 +165,7 @@ def refine_batch(sc: Scenario, positions: ArrayLike, *, halvings: int = 2, threa
 
 
 def check_steps(run: Run) -> VerificationReport:
-    """Check that the outcome of a run survives δ/2 and δ/4, and report its chattering.
+    """Check that the outcome of a run survives δ/2 and δ/4 and no pass contradicts it, and report its chattering.
 
     Parameters
     ----------
@@ -162,8 +179,12 @@ def check_steps(run: Run) -> VerificationReport:
     """
     study = step_study(run.scenario)
     ends = {(outcome.kind, outcome.defender) for outcome in study.outcomes}
+    # With each step the continuous game ends at the first pass, where there is one.
+    firsts = [passed[0] for passed in study.passes if passed]
+    ends |= {("captured" if first.defender is None else "intercepted", first.defender) for first in firsts}
     remedy = "the outcome depends on δ: take a smaller step, or play_by_events for the continuous game"
     detail = ", ".join(f"{outcome.time:.6g}" for outcome in study.outcomes)
+    detail += f"; {firsts[0]}" if firsts else ""
     check = Check("steps.outcome", float(len(ends) - 1), 0.0, True, remedy, "sec:simulations, δ", f"ends at {detail}")
     loud = chatter(run)
     notes = tuple(

@@ -52,7 +52,9 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
         let mut rows = gains.to_vec();
         rows.extend(free.target.iter().flatten());
         rows.extend_from_slice(&free.attacker);
-        let norm = c.chunks_exact(size).map(|r| r.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max) * step;
+        // A game that ended at a crossing ends within its last step.
+        let step = if k + 1 == record.steps && record.after > 0.0 { record.after } else { step };
+        let norm = closed_loop::norm(&c, size) * step;
         let pieces = (2.0 * norm).ceil().max(1.0);
         let mut z = relative(record, k, size, dim);
         if pieces > PIECES {
@@ -79,7 +81,7 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
         *j += 0.5 * weighted(&f, &z, dim);
     }
     let finite = total.iter().all(|j| j.is_finite());
-    if finite { Ok(total) } else { Err(RunError::Cost { time: game.grid().time(record.steps) }) }
+    if finite { Ok(total) } else { Err(RunError::Cost { time: record.time(game.grid()) }) }
 }
 
 /// z of row k of a record.

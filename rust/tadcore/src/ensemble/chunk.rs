@@ -4,9 +4,10 @@
 //! place, so the blocks stay full. A block whose topologies are not all in the table waits; when the others have moved,
 //! what is missing is solved and the waiting blocks follow.
 
-use super::Batch;
+use super::between::Watch;
 use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep};
 use super::sweep::sweep_of;
+use super::{Batch, Between, End};
 use crate::cancel::CancelToken;
 use crate::error::{NoMemory, RunError};
 use crate::game::validation::BEYOND;
@@ -16,9 +17,6 @@ use crate::policy::filler::Filler;
 use crate::policy::step_table::StepTable;
 use crate::simd::Width;
 use crate::simulation::{Outcome, Reach};
-
-/// How one trial ended, and the grid index of its end.
-pub(super) type End = (Outcome, usize);
 
 /// The scratch of one worker, reused from chunk to chunk.
 #[derive(Debug)]
@@ -48,15 +46,15 @@ impl Worker {
 
 /// Trials `first..first + ends.len()` of a batch.
 pub(super) struct Chunk<'a> {
-    policy: &'a Policy,
-    batch: &'a Batch<'a>,
-    first: usize,
-    shape: Shape,
+    pub(super) policy: &'a Policy,
+    pub(super) batch: &'a Batch<'a>,
+    pub(super) first: usize,
+    pub(super) shape: Shape,
     width: Width,
     sweep: Sweep,
-    blocks: Blocks,
+    pub(super) blocks: Blocks,
     /// Which trial of the chunk stands in each place.
-    who: Vec<u32>,
+    pub(super) who: Vec<u32>,
 }
 
 impl<'a> Chunk<'a> {
@@ -84,7 +82,14 @@ impl<'a> Chunk<'a> {
     }
 
     /// Plays every trial to its end.
-    pub(super) fn play(&mut self, ends: &mut [End], w: &mut Worker, cancel: &CancelToken) -> Result<(), RunError> {
+    pub(super) fn play(
+        &mut self,
+        between: Between,
+        ends: &mut [End],
+        w: &mut Worker,
+        cancel: &CancelToken,
+    ) -> Result<(), RunError> {
+        let mut watch = (between != Between::NOTHING).then(|| Watch::new(between, ends.len()));
         let transitions = self.policy.transitions();
         let last = self.policy.game().grid().steps();
         let (mut lookups, mut misses) = (0, 0);
@@ -92,6 +97,9 @@ impl<'a> Chunk<'a> {
             cancel.check()?;
             w.missing.clear();
             w.waiting.clear();
+            if let Some(watch) = &mut watch {
+                watch.note(&self.blocks, &self.who);
+            }
             let next = (k + 1 < last).then(|| transitions.step_table(k + 1));
             self.pass(k, &transitions.step_table(k), next.as_deref(), ends, w);
             drop(next);
@@ -102,6 +110,9 @@ impl<'a> Chunk<'a> {
                 w.local.clear();
                 misses += w.filler.fill(self.policy, k, &w.missing, &mut w.local, cancel)?;
                 self.follow(k, w)?;
+            }
+            if let Some(watch) = &mut watch {
+                self.look(k, watch, ends, cancel)?;
             }
             if self.blocks.live == 0 {
                 break;
@@ -167,7 +178,7 @@ impl<'a> Chunk<'a> {
     }
 
     /// The state of the trial in one place, row by row.
-    fn state(&self, place: usize) -> Vec<f64> {
+    pub(super) fn state(&self, place: usize) -> Vec<f64> {
         let width = self.shape.size * self.shape.dim;
         self.blocks.z[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
     }
@@ -184,13 +195,23 @@ impl<'a> Chunk<'a> {
         for lane in (0..LANES).rev().filter(|lane| lanes >> lane & 1 == 1) {
             let place = block * LANES + lane;
             if let Some(outcome) = self.outcome(place) {
-                ends[self.who[place] as usize] = (outcome, k);
+                let end = &mut ends[self.who[place] as usize];
+                (end.outcome, end.step) = (outcome, k);
             }
-            self.blocks.live -= 1;
-            let last = self.blocks.live;
-            self.who[place] = self.who[last];
-            self.blocks.copy(&self.shape, last, place);
+            self.remove(place);
         }
+        self.fill_up();
+    }
+
+    /// Takes the trial in one place out; the last one moves in.
+    pub(super) fn remove(&mut self, place: usize) {
+        self.blocks.live -= 1;
+        let last = self.blocks.live;
+        self.who[place] = self.who[last];
+        self.blocks.copy(&self.shape, last, place);
+    }
+
+    pub(super) fn fill_up(&mut self) {
         // Places past the last trial repeat the first of their block.
         let live = self.blocks.live;
         for place in live..live.next_multiple_of(LANES) {
@@ -208,7 +229,7 @@ impl<'a> Chunk<'a> {
                 let time = self.policy.game().grid().horizon();
                 return Err(RunError::Range { trial: Some(self.first + trial), time });
             }
-            ends[trial] = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
+            (ends[trial].outcome, ends[trial].step) = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
         }
         Ok(())
     }

@@ -12,6 +12,7 @@
 //! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
+mod between;
 mod chunk;
 
 use std::thread::available_parallelism;
@@ -23,8 +24,8 @@ use crate::error::RunError;
 use crate::memory;
 use crate::policy::{Policy, step_table};
 use crate::simd::Width;
-use crate::simulation::{Outcome, Setup};
-use chunk::{Chunk, End, Worker};
+use crate::simulation::{Outcome, Record, Setup, Termination};
+use chunk::{Chunk, Worker};
 use tadcore_kernels::ensemble::{block, sweep};
 
 /// Trials of one chunk at most.
@@ -35,6 +36,46 @@ const CHUNK_BYTES: usize = 64 << 20;
 const CHECKED: usize = 4096;
 /// Threads beyond which more would only be started: for each core, and on machines of few.
 const THREADS: (usize, usize) = (4, 64);
+
+/// How one trial ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct End {
+    /// In which way.
+    pub outcome: Outcome,
+    /// The grid index.
+    pub step: usize,
+    /// How long after that instant: 0 unless the game ended at a crossing between two.
+    pub after: f64,
+    /// Whether a capture radius was entered between two instants, where that was asked for.
+    pub passed: bool,
+}
+
+/// What is done between instants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Between {
+    /// When a trial ends.
+    pub termination: Termination,
+    /// Whether passes are looked for.
+    pub passes: bool,
+}
+
+impl Between {
+    /// Nothing: termination is tested at instants, and only there.
+    pub const NOTHING: Self = Self { termination: Termination::Sampled, passes: false };
+}
+
+impl End {
+    /// What an end is before its trial is played.
+    pub(super) const NOT_PLAYED: Self = Self { outcome: Outcome::Timeout, step: 0, after: 0.0, passed: false };
+}
+
+/// As a batch has it that does not look for passes.
+impl From<&Record> for End {
+    fn from(record: &Record) -> Self {
+        let (outcome, step, after) = (record.outcome, record.grid_index(), record.after);
+        Self { outcome, step, after, passed: false }
+    }
+}
 
 /// Positions and radii of M games; radii are M rows, or one row shared by all.
 #[derive(Debug, Clone, Copy)]
@@ -84,12 +125,21 @@ fn row(all: &[f64], width: usize, i: usize) -> &[f64] {
 ///
 /// # Errors
 /// [`RunError`] for the first row that breaks a rule, before anything is played, or when the caller cancelled.
-pub fn run(
+pub fn run(policy: &Policy, batch: &Batch, threads: Option<usize>, cancel: &CancelToken) -> Result<Vec<End>, RunError> {
+    run_with(policy, batch, Between::NOTHING, threads, cancel)
+}
+
+/// The same, with more or less done between the instants.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
     policy: &Policy,
     batch: &Batch,
+    between: Between,
     threads: Option<usize>,
     cancel: &CancelToken,
-) -> Result<Vec<(Outcome, usize)>, RunError> {
+) -> Result<Vec<End>, RunError> {
     let (n, m) = (policy.game().n(), policy.game().constrained());
     let trials = batch.len(n + 2);
     for i in 0..trials {
@@ -99,10 +149,10 @@ pub fn run(
         batch.setup(i, n, m).check(policy.game())?;
     }
     let mut ends = Vec::new();
-    memory::grow("the outcomes of a batch", &mut ends, trials, (Outcome::Timeout, 0))?;
+    memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
     let cores = available_parallelism().map_or(1, usize::from);
     let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
-    play(policy, batch, threads, Width::in_use(), &mut ends, cancel)?;
+    play(policy, batch, between, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
 }
 
@@ -115,6 +165,7 @@ fn most_trials(size: usize) -> usize {
 fn play(
     policy: &Policy,
     batch: &Batch,
+    between: Between,
     threads: usize,
     width: Width,
     ends: &mut [End],
@@ -126,7 +177,7 @@ fn play(
     let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
     let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
     let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
-        Chunk::new(policy, batch, c * size, ends.len(), width).play(ends, worker, cancel)
+        Chunk::new(policy, batch, c * size, ends.len(), width).play(between, ends, worker, cancel)
     };
     if threads == 1 || ends.len() <= size {
         let mut worker = Worker::new(policy);
@@ -161,8 +212,8 @@ mod tests {
                 let batch = Batch { dim: 2, positions: &positions, visibility: &visibility, capture: &capture };
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
-                    let mut ends = vec![(Outcome::Timeout, 0); 50];
-                    play(&policy, &batch, 1, width, &mut ends, &cancel).expect("a batch");
+                    let mut ends = vec![End::NOT_PLAYED; 50];
+                    play(&policy, &batch, Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
                     (ends, policy.save_transitions(&cancel).expect("memory"))
                 });
                 let played: Vec<_> = played.collect();

@@ -46,6 +46,12 @@ impl Grid {
         self.horizon / self.steps as f64
     }
 
+    /// t_k + s for an s within a step: never beyond t_{k+1}.
+    #[must_use]
+    pub fn time_after(&self, k: usize, s: f64) -> f64 {
+        if s > 0.0 { (self.time(k) + s).min(self.time(k + 1)) } else { self.time(k) }
+    }
+
     /// t_k, the double nearest to k T / K: t_0 = 0 and t_K = T exactly.
     ///
     /// The rounded product k T over K would be rounded twice, and miss T itself by a digit for one grid in 17.

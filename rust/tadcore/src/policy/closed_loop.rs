@@ -29,6 +29,12 @@ pub fn free_rows(game: &Game, p: &[f64]) -> FreeRows {
     FreeRows { attacker, target }
 }
 
+/// ‖C‖, the largest sum of a row.
+#[must_use]
+pub fn norm(c: &[f64], size: usize) -> f64 {
+    c.chunks_exact(size).map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0, f64::max)
+}
+
 /// Writes C (N × N, row-major) for the gain rows `gains` (m × N).
 pub fn matrix(free: &FreeRows, gains: &[f64], c: &mut [f64]) {
     let n = free.attacker.len();

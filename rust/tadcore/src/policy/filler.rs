@@ -114,6 +114,9 @@ impl Filler {
         for &wanted in wanted {
             match policy.table.peek(instant.step, wanted.topology) {
                 Some(known) => {
+                    self.closed_loop.resize(n * n, 0.0);
+                    closed_loop::matrix(&instant.free, &known.gains.rows, &mut self.closed_loop);
+                    policy.transitions.note_rate(instant.step, closed_loop::norm(&self.closed_loop, n));
                     let none: Vec<usize> = (0..n).collect();
                     pad(&known.transition, &none, &mut self.padded)?;
                     instant.store(wanted, local, &self.padded)?;
@@ -129,6 +132,7 @@ impl Filler {
         let canonical_forms: Vec<Topology> = unknown.iter().map(|wanted| wanted.canonical.clone()).collect();
         solver.solve_all(&instant.problem, &canonical_forms, Options::default(), |index, gains| {
             closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
+            policy.transitions.note_rate(instant.step, closed_loop::norm(closed_loop, n));
             let step = policy.game.grid().step();
             exponential::exponential(closed_loop, &instant.free.attacker, step, square, row, cancel)?;
             pad(square, &unknown[index].order, padded)?;

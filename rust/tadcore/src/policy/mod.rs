@@ -241,6 +241,7 @@ impl Policy {
         saved::read(bytes, &self.game, self.budget.capacity(), cancel, |step, key, matrix| {
             let canonical =
                 self.classes.any().then(|| self.classes.canonical(&Topology::from_words(rows, size, key)).0);
+            self.transitions.note_rate(step, f64::INFINITY);
             self.transitions.keep(step, key, canonical.as_ref().map(Topology::words), matrix, &self.budget);
         })?;
         Ok(self.transitions.entries())

@@ -90,6 +90,8 @@ impl Drop for Claim<'_> {
 pub(crate) struct Transitions {
     tables: Vec<RwLock<StepTable>>,
     claims: Vec<Claims>,
+    /// The largest ‖C‖ among the entries of each instant, as bits: their order is that of the numbers.
+    rates: Vec<AtomicU64>,
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
     entries: AtomicUsize,
@@ -100,6 +102,7 @@ impl Transitions {
         Ok(Self {
             tables: each(steps, || RwLock::new(StepTable::new(rows, size)), cancel)?,
             claims: each(steps, Claims::default, cancel)?,
+            rates: each(steps, || AtomicU64::new(0), cancel)?,
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
             entries: AtomicUsize::new(0),
@@ -109,6 +112,16 @@ impl Transitions {
     /// The table of an instant, for reading.
     pub(crate) fn step_table(&self, step: usize) -> RwLockReadGuard<'_, StepTable> {
         self.tables[step].read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The largest ‖C‖ among the entries of an instant, or more: infinite for entries from a file.
+    pub(crate) fn rate(&self, step: usize) -> f64 {
+        f64::from_bits(self.rates[step].load(Ordering::Relaxed))
+    }
+
+    /// Notes the ‖C‖ of an entry, at least 0.
+    pub(super) fn note_rate(&self, step: usize, rate: f64) {
+        self.rates[step].fetch_max(rate.to_bits(), Ordering::Relaxed);
     }
 
     /// What threads are solving at an instant.

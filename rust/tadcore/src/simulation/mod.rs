@@ -9,11 +9,14 @@
 //! The sampled-data reading of the paper: feedback and network are held between grid instants
 //! (zero-order hold), the motion is exact.
 
+pub(crate) mod crossing;
 mod outcome;
+pub(crate) mod passes;
 mod record;
 mod setup;
 
 pub use outcome::{Outcome, Reach, distance, relative_state};
+pub use passes::{Pass, Termination};
 pub(crate) use record::apply;
 pub use record::{Record, simulate, simulate_with};
 pub use setup::Setup;

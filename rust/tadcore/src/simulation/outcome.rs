@@ -53,6 +53,16 @@ impl Reach {
         Self { defenders: defenders.to_vec(), attacker }
     }
 
+    /// The largest squared distance of row i within its radius.
+    pub(crate) fn squared(&self, i: usize) -> f64 {
+        self.defenders.get(i).copied().unwrap_or(self.attacker)
+    }
+
+    /// The row of z whose radius decides an outcome.
+    pub(crate) fn row(&self, outcome: Outcome) -> usize {
+        if let Outcome::Intercepted(i) = outcome { i } else { self.defenders.len() }
+    }
+
     /// The capture or interception at the state `z` (N rows of `dim`), if there is one.
     #[must_use]
     pub fn ends(&self, z: &[f64], dim: usize) -> Option<Outcome> {

@@ -1,9 +1,11 @@
 //! One game, everything recorded.
 
 use super::outcome::{Outcome, Reach, relative_state};
+use super::passes::{Pass, Step, Termination};
 use super::setup::Setup;
 use crate::cancel::CancelToken;
 use crate::error::{RunError, Stopped};
+use crate::game::Grid;
 use crate::game::validation::BEYOND;
 use crate::memory::{MOST_BYTES, append, reserve, spare, within};
 use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
@@ -22,6 +24,11 @@ pub struct Record {
     pub outcome: Outcome,
     /// L.
     pub steps: usize,
+    /// How long after the instant before the last row the game ended, between two instants: 0 but for
+    /// [`Termination::Continuous`]. The last row is then the state there, under the feedback of that instant, which is held.
+    pub after: f64,
+    /// Capture radii that were entered between two instants, in the order of time.
+    pub passes: Vec<Pass>,
     /// Axes.
     pub dim: usize,
     /// (L + 1) × (n + 2) × dim.
@@ -50,10 +57,10 @@ pub struct Record {
 /// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision, or when
 /// the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
-    simulate_with(policy, setup, &EdgeRule::PAPER, cancel)
+    simulate_with(policy, setup, &EdgeRule::PAPER, Termination::Sampled, cancel)
 }
 
-/// The same with hysteresis and dwell time of the edges, unless `rule` is the paper's.
+/// The same with hysteresis and dwell time of the edges, unless `rule` is the paper's, and with its own kind of end.
 ///
 /// # Errors
 /// [`RunError`] for positions, radii or a rule that cannot be accepted, or when the caller cancelled.
@@ -61,6 +68,7 @@ pub fn simulate_with(
     policy: &Policy,
     setup: &Setup,
     rule: &EdgeRule,
+    termination: Termination,
     cancel: &CancelToken,
 ) -> Result<Record, RunError> {
     setup.check(policy.game())?;
@@ -79,6 +87,8 @@ pub fn simulate_with(
     let mut record = Record {
         outcome: Outcome::Timeout,
         steps: 0,
+        after: 0.0,
+        passes: Vec::new(),
         dim,
         positions: Vec::new(),
         controls: Vec::new(),
@@ -103,6 +113,7 @@ pub fn simulate_with(
         }
         let step = policy.at(k, &topology, &mut solver, cancel)?;
         record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+        record.count(&step);
         if !record.last_row_is_bounded(n + 2) {
             return Err(RunError::Range { trial: None, time: game.grid().time(k) });
         }
@@ -111,7 +122,21 @@ pub fn simulate_with(
             record.steps = k;
             break;
         }
+        let before = (termination == Termination::Continuous).then(|| attacker.clone());
         advance(&step, &z, dim, &mut next, &mut attacker);
+        let within = Step { k, gains: &step.gains.rows, start: &z, end: &next, dim };
+        match before {
+            None => within.passes(policy, &reach, &mut record.passes, cancel)?,
+            Some(from) => {
+                if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {
+                    let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
+                    record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+                    record.certified += usize::from(step.gains.certified);
+                    (record.outcome, record.after, record.steps) = (Pass::outcome(row, n), after, k + 1);
+                    break;
+                }
+            }
+        }
         std::mem::swap(&mut z, &mut next);
     }
     Ok(record)
@@ -139,6 +164,24 @@ pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
 }
 
 impl Record {
+    /// The grid index of the end, or of the instant before it.
+    #[must_use]
+    pub fn grid_index(&self) -> usize {
+        self.steps - usize::from(self.after > 0.0)
+    }
+
+    /// When the game ended.
+    #[must_use]
+    pub fn time(&self, grid: &Grid) -> f64 {
+        grid.time_after(self.grid_index(), self.after)
+    }
+
+    /// When row i was recorded.
+    #[must_use]
+    pub fn time_of(&self, i: usize, grid: &Grid) -> f64 {
+        if i == self.steps { self.time(grid) } else { grid.time(i) }
+    }
+
     fn last_row_is_bounded(&self, players: usize) -> bool {
         let row = players * self.dim;
         let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
@@ -192,9 +235,12 @@ impl Record {
         self.networks.push(network.clone());
         append(WHAT, &mut self.gains, &step.gains.rows)?;
         self.theta.push(step.gains.theta);
+        Ok(())
+    }
+
+    fn count(&mut self, step: &StepPolicy) {
         self.iterations += step.gains.iterations;
         self.unconverged += usize::from(step.gains.status != Status::Converged);
         self.certified += usize::from(step.gains.certified);
-        Ok(())
     }
 }

@@ -1,0 +1,357 @@
+//! Within a step: when two players first come within a capture radius of one another, and how near they come.
+//!
+//! The motion is known, z(t_k + s) = exp(Cs) z(t_k), so nothing is sampled. The step is halved as often as needed; on a
+//! part of length w with ends z(a) and z(b), row i leaves its chord by at most
+//!
+//! $$\tfrac{w^2}{8} \max_{\tau \le w} \lVert \ddot z_i(a + \tau) \rVert, \qquad
+//!   \ddot z(a + \tau) = e^{C\tau} C^2 z(a).$$
+//!
+//! A part whose chord stays further away than that has no crossing. One that is a chord to rounding is a quadratic
+//! equation. What lies between is halved again, the earlier half first: no crossing is missed, a tangency included.
+//!
+//! | symbol | name here | meaning |
+//! |---|---|---|
+//! | exp(Cw) | [`Level::transition`] | over a part of length w = δ 2⁻ʲ |
+//! | sup ‖exp(Cτ)‖, τ ≤ w | [`Level::growth`] | in the norm of row sums |
+//! | Σ_j \|C_ij\|, C² | `norm`, `square` | what bounds ‖z̈_i‖ |
+
+use super::record::apply;
+use crate::cancel::CancelToken;
+use crate::error::Stopped;
+use crate::memory::zeros;
+use crate::network::{squared_distance, squared_norm};
+use crate::policy::closed_loop;
+use crate::policy::exponential::{exponential, multiply};
+
+/// What asks for memory here.
+const WHAT: &str = "the motion within a step";
+/// Halvings of a step at most: 2⁻⁶⁴ of a step is below every rounding of its length.
+const LEVELS: usize = 64;
+/// ‖C‖w up to which e^{‖C‖w} bounds the growth well.
+const SHORT: f64 = 1.0;
+/// A chord is exact where it is off by no more than this part of its ends.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Parts of one step that are looked at for one row; far more than any motion needs that stays a double.
+const PARTS: usize = 1 << 16;
+
+#[derive(Debug)]
+struct Level {
+    transition: Vec<f64>,
+    growth: f64,
+}
+
+/// The motion of all rows of z over one step.
+#[derive(Debug)]
+pub(crate) struct Motion<'a> {
+    c: &'a [f64],
+    size: usize,
+    dim: usize,
+    step: f64,
+    norm: f64,
+    square: Vec<f64>,
+    levels: Vec<Level>,
+    /// Parts that may still be looked at.
+    left: usize,
+    cancel: &'a CancelToken,
+}
+
+/// A part of a step: from z(`from`) over δ 2^−`level`.
+#[derive(Clone, Copy)]
+struct Part<'z> {
+    level: usize,
+    from: f64,
+    start: &'z [f64],
+    end: &'z [f64],
+}
+
+/// The chord of one row over a part.
+struct Chord {
+    /// The nearest point to the origin, as a share of the chord, and its distance.
+    share: f64,
+    nearest: f64,
+    /// The same for the whole line through it.
+    foot: f64,
+    aside: f64,
+    /// Its length, and by how much the motion may leave it.
+    length: f64,
+    off: f64,
+    /// Whether it leaves it by rounding alone.
+    straight: bool,
+}
+
+impl<'a> Motion<'a> {
+    /// Of ż = C z over `step`, for states of `dim` axes.
+    pub(crate) fn new(
+        c: &'a [f64],
+        size: usize,
+        dim: usize,
+        step: f64,
+        cancel: &'a CancelToken,
+    ) -> Result<Self, Stopped> {
+        let norm = closed_loop::norm(c, size);
+        let mut square = zeros(WHAT, size * size)?;
+        multiply(&mut square, c, c, size, cancel)?;
+        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, cancel })
+    }
+
+    /// The first s in (0, δ] with ‖z_i(s)‖² ≤ `reach`, from a start outside; `start` and `end` are z(0) and z(δ).
+    pub(crate) fn enters(&mut self, i: usize, reach: f64, start: &[f64], end: &[f64]) -> Result<Option<f64>, Stopped> {
+        self.left = PARTS;
+        self.first(i, reach, Part { level: 0, from: 0.0, start, end })
+    }
+
+    /// The s in [0, δ] at which ‖z_i(s)‖ is least, and that distance.
+    pub(crate) fn closest(&mut self, i: usize, start: &[f64], end: &[f64]) -> Result<(f64, f64), Stopped> {
+        let row = |z: &[f64]| squared_norm(&z[i * self.dim..(i + 1) * self.dim]).sqrt();
+        let (before, after) = (row(start), row(end));
+        let mut best = if after < before { (self.step, after) } else { (0.0, before) };
+        self.left = PARTS;
+        self.nearer(i, Part { level: 0, from: 0.0, start, end }, &mut best)?;
+        Ok(best)
+    }
+
+    /// z(s), and what h ∫₀ˢ exp(Cτ) dτ z(0) adds to the position of the player whose feedback is `row`.
+    pub(crate) fn at(&self, s: f64, row: &[f64], start: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Stopped> {
+        let (mut e, mut a) = (zeros(WHAT, self.size * self.size)?, vec![0.0; self.size]);
+        exponential(self.c, row, s, &mut e, &mut a, self.cancel)?;
+        let mut moved = vec![0.0; self.dim];
+        apply(&a, start, self.dim, &mut moved);
+        Ok((self.moved(&e, start), moved))
+    }
+
+    fn moved(&self, transition: &[f64], z: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; z.len()];
+        for (row, out) in transition.chunks_exact(self.size).zip(out.chunks_exact_mut(self.dim)) {
+            apply(row, z, self.dim, out);
+        }
+        out
+    }
+
+    fn width(&self, level: usize) -> f64 {
+        self.step * 0.5_f64.powi(level as i32)
+    }
+
+    /// The level that halves a step `j` times; those before it first.
+    fn level(&mut self, j: usize) -> Result<&Level, Stopped> {
+        while self.levels.len() <= j {
+            let level = self.levels.len();
+            let mut transition = zeros(WHAT, self.size * self.size)?;
+            let mut unused = vec![0.0; self.size];
+            exponential(self.c, &vec![0.0; self.size], self.width(level), &mut transition, &mut unused, self.cancel)?;
+            self.levels.push(Level { transition, growth: f64::NAN });
+        }
+        if self.levels[j].growth.is_nan() {
+            let (size, n) = (self.norm * self.width(j), self.size);
+            self.levels[j].growth = if size <= SHORT || j >= LEVELS {
+                size.exp()
+            } else {
+                // Over two halves: what one of them can do, once more.
+                let half = self.level(j + 1)?;
+                half.growth * closed_loop::norm(&half.transition, n).max(1.0)
+            };
+        }
+        Ok(&self.levels[j])
+    }
+
+    fn chord(&mut self, i: usize, part: Part) -> Result<Chord, Stopped> {
+        let (dim, width) = (self.dim, self.width(part.level));
+        let (p, q) = (&part.start[i * dim..(i + 1) * dim], &part.end[i * dim..(i + 1) * dim]);
+        self.left = self.left.saturating_sub(1);
+        let squared = squared_distance(p, q);
+        let along: f64 = p.iter().zip(q).map(|(p, q)| p * (p - q)).sum();
+        let foot = if squared > 0.0 { along / squared } else { 0.0 };
+        let share = foot.clamp(0.0, 1.0);
+        let at =
+            |share: f64| -> f64 { length(&p.iter().zip(q).map(|(p, q)| p + share * (q - p)).collect::<Vec<f64>>()) };
+        let turning = self.moved(&self.square, part.start);
+        let farthest = part.start.chunks_exact(dim).map(length).fold(0.0, f64::max);
+        let most = turning.chunks_exact(dim).map(length).fold(0.0, f64::max);
+        let size = self.norm * width;
+        let bend = if size <= SHORT {
+            length(&turning[i * dim..(i + 1) * dim]) + size.exp_m1() * most
+        } else {
+            // C² z is known to rounding only, which a stiff C makes large.
+            self.level(part.level)?.growth * (most + ROUNDING * self.norm * self.norm * farthest)
+        };
+        let off = 0.125 * width * width * bend;
+        let ends = length(p) + length(q);
+        let straight = off <= ROUNDING * ends || part.level >= LEVELS || self.left == 0;
+        let (nearest, aside) = (at(share), at(foot));
+        Ok(Chord { share, nearest, foot, aside, length: squared.sqrt(), off: off + ROUNDING * ends, straight })
+    }
+
+    fn halves<'z>(&mut self, part: Part<'z>, middle: &'z mut Vec<f64>) -> Result<[Part<'z>; 2], Stopped> {
+        let level = part.level + 1;
+        self.level(level)?;
+        *middle = self.moved(&self.levels[level].transition, part.start);
+        let from = part.from + self.width(level);
+        Ok([Part { level, end: middle, ..part }, Part { level, from, start: middle, end: part.end }])
+    }
+
+    fn first(&mut self, i: usize, reach: f64, part: Part) -> Result<Option<f64>, Stopped> {
+        let row = i * self.dim..(i + 1) * self.dim;
+        if squared_norm(&part.start[row.clone()]) <= reach {
+            return Ok(Some(part.from));
+        }
+        let (ends_inside, radius) = (squared_norm(&part.end[row]) <= reach, reach.sqrt());
+        let chord = self.chord(i, part)?;
+        if !ends_inside && chord.nearest > radius + chord.off {
+            return Ok(None);
+        }
+        if chord.straight {
+            if !ends_inside && chord.nearest > radius {
+                return Ok(None);
+            }
+            let inside = ((radius - chord.aside) * (radius + chord.aside)).max(0.0);
+            let share = if chord.length > 0.0 { chord.foot - inside.sqrt() / chord.length } else { 1.0 };
+            return Ok(Some(part.from + share.clamp(0.0, 1.0) * self.width(part.level)));
+        }
+        let mut middle = Vec::new();
+        let [earlier, later] = self.halves(part, &mut middle)?;
+        let found = self.first(i, reach, earlier)?;
+        if found.is_some() { Ok(found) } else { self.first(i, reach, later) }
+    }
+
+    fn nearer(&mut self, i: usize, part: Part, best: &mut (f64, f64)) -> Result<(), Stopped> {
+        let chord = self.chord(i, part)?;
+        if chord.nearest - chord.off >= best.1 && !chord.straight {
+            return Ok(());
+        }
+        if chord.straight {
+            if chord.nearest < best.1 {
+                *best = (part.from + chord.share * self.width(part.level), chord.nearest);
+            }
+            return Ok(());
+        }
+        let mut middle = Vec::new();
+        let parts = self.halves(part, &mut middle)?;
+        let distance = squared_norm(&parts[1].start[i * self.dim..(i + 1) * self.dim]).sqrt();
+        if distance < best.1 {
+            *best = (parts[1].from, distance);
+        }
+        for part in parts {
+            self.nearer(i, part, best)?;
+        }
+        Ok(())
+    }
+}
+
+/// The length of a vector, also where its square is no double.
+fn length(v: &[f64]) -> f64 {
+    let most = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if (1e-140..1e140).contains(&most) {
+        return squared_norm(v).sqrt();
+    }
+    if most > 0.0 { most * v.iter().map(|x| (x / most) * (x / most)).sum::<f64>().sqrt() } else { 0.0 }
+}
+
+/// By how much, relative to the farthest row, any row may leave its chord over a step with ‖C‖δ = `size`.
+pub(crate) fn clear(size: f64) -> f64 {
+    0.125 * size * size * size.exp() * (1.0 + 1e-9) + ROUNDING
+}
+
+/// Of trials side by side, a bit for each in which some row may enter its radius: `start` and `end` hold row j on axis x
+/// at j·dim + x, `capture` the squared radii, and `stretch` is [`clear`]'s. A bit too many costs time, none is missing.
+pub(crate) fn near<const L: usize>(
+    start: &[[f64; L]],
+    end: &[[f64; L]],
+    capture: &[[f64; L]],
+    dim: usize,
+    stretch: f64,
+) -> u32 {
+    let (mut farthest, mut near) = ([0.0_f64; L], [false; L]);
+    for row in start.chunks_exact(dim) {
+        for l in 0..L {
+            farthest[l] = farthest[l].max(row.iter().map(|x| x[l] * x[l]).sum());
+        }
+    }
+    let off = farthest.map(|square| stretch * square.sqrt());
+    for ((p, q), reach) in start.chunks_exact(dim).zip(end.chunks_exact(dim)).zip(capture) {
+        for l in 0..L {
+            let (mut squared, mut along) = (0.0, 0.0);
+            for (p, q) in p.iter().zip(q) {
+                let d = p[l] - q[l];
+                squared += d * d;
+                along += p[l] * d;
+            }
+            let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+            let nearest: f64 = p.iter().zip(q).map(|(p, q)| p[l] + share * (q[l] - p[l])).map(|x| x * x).sum();
+            let limit = reach[l].sqrt() + off[l];
+            // What is no number is looked at.
+            let clear = nearest > limit * limit * (1.0 + 1e-9);
+            near[l] |= !clear;
+        }
+    }
+    near.iter().enumerate().fold(0, |bits, (l, &near)| bits | u32::from(near) << l)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows that turn into one another: the first is on the ellipse (a cos ωs, −b sin ωs).
+    fn ellipse(omega: f64, a: f64, b: f64, step: f64, test: impl Fn(&mut Motion, &[f64], &[f64])) {
+        let (c, start) = ([0.0, -omega, omega, 0.0], [a, 0.0, 0.0, b]);
+        let (sin, cos) = (omega * step).sin_cos();
+        let end = [a * cos, -b * sin, a * sin, b * cos];
+        test(&mut Motion::new(&c, 2, 2, step, &CancelToken::new()).expect("memory"), &start, &end);
+    }
+
+    #[test]
+    fn an_ellipse_is_entered_where_its_equation_says() {
+        let (a, b): (f64, f64) = (2.0, 0.01);
+        for (omega, step) in [(1.0, 3.0), (0.1, 20.0), (900.0, 3.4e-3), (1.0, 30.0)] {
+            for sigma in [1.9, 0.5, 0.011, b * (1.0 + 1e-9)] {
+                let angle = ((sigma * sigma - b * b) / (a * a - b * b)).sqrt().acos();
+                ellipse(omega, a, b, step, |motion, start, end| {
+                    let found =
+                        motion.enters(0, sigma * sigma, start, end).expect("memory").expect("a crossing") * omega;
+                    // Near a tangency the angle is known to the root of a rounding.
+                    let known = 1e-13 + 1e-15 / (angle.cos() * a);
+                    assert!((found - angle).abs() < known, "ω = {omega}, σ = {sigma}: {found} and {angle}");
+                });
+            }
+            ellipse(omega, a, b, step, |motion, start, end| {
+                let (at, nearest) = motion.closest(0, start, end).expect("memory");
+                // An ellipse comes as near once in each half turn.
+                let quarter = (at * omega / std::f64::consts::PI - 0.5).rem_euclid(1.0);
+                assert!((nearest - b).abs() < 1e-15 && quarter.min(1.0 - quarter) < 1e-6, "{at} {nearest} {quarter}");
+            });
+        }
+    }
+
+    #[test]
+    fn a_tangency_is_met_and_a_near_miss_is_none() {
+        for omega in [0.05, 1.0, 3.0] {
+            for (sigma, met) in [(0.3 * (1.0 + 1e-13), true), (0.3 * (1.0 - 1e-13), false), (0.29, false)] {
+                ellipse(omega, 2.0, 0.3, 3.0 / omega, |motion, start, end| {
+                    assert_eq!(
+                        motion.enters(0, sigma * sigma, start, end).expect("memory").is_some(),
+                        met,
+                        "ω = {omega}, σ = {sigma}"
+                    );
+                });
+            }
+        }
+    }
+
+    /// A stiff row that runs past the origin to where a row at rest draws it: x = 1 − 2 e^{−λs}, y = 0.005.
+    #[test]
+    fn a_stiff_motion_is_met_as_early_as_it_comes() {
+        for rate in [1.0, 1e3, 1e6, 1e9] {
+            let (c, start) = ([-rate, rate, 0.0, 0.0], [-1.0, 0.005, 1.0, 0.005]);
+            let end = [1.0 - 2.0 * (-rate * 1.0_f64).exp(), 0.005, 1.0, 0.005];
+            let none = CancelToken::new();
+            let mut motion = Motion::new(&c, 2, 2, 1.0, &none).expect("memory");
+            let sigma: f64 = 0.01;
+            let x = -(sigma * sigma - 0.005 * 0.005).sqrt();
+            let wanted = -((1.0 - x) / 2.0).ln() / rate;
+            let found = motion.enters(0, sigma * sigma, &start, &end).expect("memory").expect("a crossing");
+            assert!((found - wanted).abs() < 1e-12 * wanted, "λ = {rate}: {found} and {wanted}");
+            let (at, nearest) = motion.closest(0, &start, &end).expect("memory");
+            assert!((at * rate - std::f64::consts::LN_2).abs() < 1e-6, "λ = {rate}: {at}");
+            assert!((nearest - 0.005).abs() < 1e-14);
+            assert_eq!(motion.enters(0, 0.0049 * 0.0049, &start, &end), Ok(None));
+        }
+    }
+}
