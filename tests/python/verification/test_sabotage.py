@@ -324,6 +324,12 @@ def test_nothing_that_a_run_carries_is_left_unchecked(run, field):
         with pytest.raises(tadcore.ScenarioError, match=field):
             tadcore.verify(dataclasses.replace(run, **{field: 0.1}))
         return
+    elif field == "termination":
+        with pytest.raises(tadcore.ScenarioError, match="continuous"):
+            tadcore.verify(dataclasses.replace(run, termination="continuous"))
+        return
+    elif field == "passes":
+        other = (*found, "d1 passes at t = 0")
     elif field == "adjacency":
         other = ~found
     elif field == "costs":

@@ -45,7 +45,7 @@ def check_synthesis(run: Run) -> Check:
     off = np.abs(again.gains - run.gains).max(axis=(1, 2)) / np.maximum(np.abs(again.gains).max(axis=(1, 2)), TINY)
     k = int(np.argmax(off))
     worst, where = float(off[k]), f"gains at t = {run.times[k]:.6g}"
-    for name in ("iterations", "unconverged", "certified"):
+    for name in ("iterations", "unconverged", "certified", "passes"):
         found, recorded = getattr(again, name), getattr(run, name)
         if found != recorded:
             worst, where = max(worst, 1.0), f"{name}: {recorded} recorded, {found} found"
