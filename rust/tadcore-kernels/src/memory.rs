@@ -18,7 +18,7 @@ pub fn within(what: &'static str, bytes: u128, limit: u64) -> Result<(), NoMemor
 }
 
 /// Bytes that must be left before what is small is allocated.
-const SPARE: usize = 4 << 20;
+const SPARE: usize = 8 << 20;
 
 fn refused<T>(what: &'static str, len: usize) -> NoMemory {
     NoMemory { what, bytes: (len as u64).saturating_mul(size_of::<T>() as u64), limit: None }
@@ -33,6 +33,11 @@ pub fn zeros<T: Zeroable>(what: &'static str, len: usize) -> Result<Vec<T>, NoMe
 /// cannot be had it stops, while there is memory left for what is small.
 pub fn reserve<T>(what: &'static str, list: &mut Vec<T>, more: usize) -> Result<(), NoMemory> {
     list.try_reserve(more).map_err(|_| refused::<T>(what, list.len().saturating_add(more)))
+}
+
+/// Makes room for exactly `more` elements.
+pub fn reserve_exact<T>(what: &'static str, list: &mut Vec<T>, more: usize) -> Result<(), NoMemory> {
+    list.try_reserve_exact(more).map_err(|_| refused::<T>(what, list.len().saturating_add(more)))
 }
 
 /// Whether there is memory left for what is small and many: so much is asked for, and given back.
@@ -57,7 +62,7 @@ pub fn copy<T: Copy>(what: &'static str, from: &[T]) -> Result<Vec<T>, NoMemory>
 /// Makes a list at least `len` long.
 pub fn grow<T: Copy>(what: &'static str, list: &mut Vec<T>, len: usize, fill: T) -> Result<(), NoMemory> {
     if let Some(more) = len.checked_sub(list.len()) {
-        list.try_reserve_exact(more).map_err(|_| refused::<T>(what, len))?;
+        reserve_exact(what, list, more)?;
         list.resize(len, fill);
     }
     Ok(())

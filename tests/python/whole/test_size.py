@@ -177,6 +177,8 @@ def test_a_thousand_defenders_are_a_scenario_and_their_grid_is_refused_by_size()
         ("crowd(10, horizon=30.0, step=0.0005)", "tadcore.solve_equilibrium(sc).P", 60),
         ("crowd(10, horizon=30.0, step=0.0005)", "tadcore.solve_equilibrium(sc)._core.feedback()", 20),
         ("crowd(300, horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 40),
+        ("crowd(300, interaction='I2', horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 10),
+        ("crowd(40, zeta=3.0)", "tadcore.simulate_batch(sc, np.repeat([sc.positions], 50_000, 0))", 60),
     ],
 )
 def test_a_system_without_memory_is_an_error(make, call, room):

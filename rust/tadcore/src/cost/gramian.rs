@@ -11,7 +11,7 @@ use crate::memory::{copy, zeros};
 use crate::policy::exponential::{exponential, multiply};
 
 /// What asks for memory here.
-const WHAT: &str = "the costs of one run";
+pub(super) const WHAT: &str = "the costs of one run";
 
 /// Terms of the series: the last is below 10⁻²⁴ of the first, since ‖C‖h ≤ ½ in both norms.
 const TERMS: usize = 24;

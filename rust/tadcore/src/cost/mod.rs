@@ -9,9 +9,12 @@
 
 mod gramian;
 
+use gramian::WHAT;
+
 use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::Interaction;
+use crate::memory::{append, zeros};
 use crate::policy::{Policy, closed_loop};
 use crate::simulation::{Record, apply};
 
@@ -43,22 +46,24 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
     let step = game.grid().step();
     let running = game.state_weights(false);
     let mut total = vec![0.0; running.len()];
-    let mut c = vec![0.0; size * size];
+    let mut rows = Vec::new();
+    let mut c = zeros(WHAT, size * size)?;
     for k in 0..record.steps {
         cancel.check()?;
         let gains = &record.gains[k * m * size..(k + 1) * m * size];
         let free = policy.free_rows(k);
         closed_loop::matrix(&free, gains, &mut c);
-        let mut rows = gains.to_vec();
-        rows.extend(free.target.iter().flatten());
-        rows.extend_from_slice(&free.attacker);
+        rows.clear();
+        append(WHAT, &mut rows, gains)?;
+        append(WHAT, &mut rows, free.target.as_deref().unwrap_or_default())?;
+        append(WHAT, &mut rows, &free.attacker)?;
         // A game that ended at a crossing ends within its last step.
         let step = if k + 1 == record.steps && record.after > 0.0 { record.after } else { step };
         let norm = closed_loop::norm(&c, size) * step;
         let pieces = (2.0 * norm).ceil().max(1.0);
         let mut z = relative(record, k, size, dim);
         if pieces > PIECES {
-            let mut forms = forms(policy, &running, &rows);
+            let mut forms = forms(policy, &running, &rows, cancel)?;
             gramian::gramians(&c, size, step, &mut forms, cancel)?;
             total.iter_mut().zip(&forms).for_each(|(j, w)| *j += 0.5 * quadratic(w, &z, dim));
             continue;
@@ -119,7 +124,7 @@ fn integrands(policy: &Policy, running: &[Vec<f64>], rows: &[f64], z: &[f64], di
 }
 
 /// The same as quadratic forms: of each objective the M with zᵀ M z twice the integrand at z.
-fn forms(policy: &Policy, running: &[Vec<f64>], rows: &[f64]) -> Vec<Vec<f64>> {
+fn forms(policy: &Policy, running: &[Vec<f64>], rows: &[f64], cancel: &CancelToken) -> Result<Vec<Vec<f64>>, RunError> {
     let game = policy.game();
     let (n, size, w) = (game.n(), game.size(), game.weights());
     let team = |sign: f64| w.r_d.iter().map(move |r| sign * r).enumerate();
@@ -128,13 +133,14 @@ fn forms(policy: &Policy, running: &[Vec<f64>], rows: &[f64]) -> Vec<Vec<f64>> {
         Interaction::I2 => vec![team(-1.0).chain([(n, -w.r_tau), (n + 1, w.r_a)]).collect()],
     };
     let form = |(efforts, q): (&Vec<(usize, f64)>, &Vec<f64>)| {
-        let mut m = vec![0.0; size * size];
+        let mut m = zeros(WHAT, size * size)?;
         for (player, r) in efforts {
+            cancel.check()?;
             let row = &rows[player * size..(player + 1) * size];
             m.iter_mut().enumerate().for_each(|(ij, x)| *x += r * row[ij / size] * row[ij % size]);
         }
         q.iter().enumerate().for_each(|(i, q)| m[i * size + i] += q);
-        m
+        Ok(m)
     };
     own.iter().zip(running).map(form).collect()
 }

@@ -32,6 +32,8 @@ use tadcore_kernels::ensemble::{block, sweep};
 pub const CHUNK: usize = 8192;
 /// Bytes, at most, of the transitions that the trials of a chunk may need at one instant, if each needs its own.
 const CHUNK_BYTES: usize = 64 << 20;
+/// Bytes that a thread may need before anything is tabulated.
+const THREAD_BYTES: usize = 16 << 20;
 /// Trials that are checked between two looks at the cancel token.
 const CHECKED: usize = 4096;
 /// Threads beyond which more would only be started: for each core, and on machines of few.
@@ -152,6 +154,9 @@ pub fn run_with(
     memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
     let cores = available_parallelism().map_or(1, usize::from);
     let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
+    let threads = threads.min(trials.div_ceil(block::LANES)).max(1);
+    // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
+    memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
     play(policy, batch, between, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
 }

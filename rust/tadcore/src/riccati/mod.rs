@@ -45,7 +45,7 @@ mod weight;
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, Stopped};
 use crate::game::{Game, Interaction};
-use crate::memory::zeros;
+use crate::memory::{spare, zeros};
 
 /// The solution of a game's Riccati equations on its grid.
 ///
@@ -68,6 +68,7 @@ pub struct Equilibrium {
 pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, EquilibriumError> {
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
     let mut nodes = zeros("P on the grid", (steps + 1) * groups(interaction) * size * size)?;
+    spare("the solution of the Riccati equations")?;
     let integrator_steps = match interaction {
         Interaction::I1 => coupled::solve(game, cancel, &mut nodes)?,
         Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,

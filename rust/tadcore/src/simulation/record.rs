@@ -73,6 +73,7 @@ pub fn simulate_with(
 ) -> Result<Record, RunError> {
     setup.check(policy.game())?;
     rule.check()?;
+    spare(WHAT)?;
     let game = policy.game();
     let (n, size, m, dim) = (game.n(), game.size(), game.constrained(), setup.dim);
     let reach = Reach::new(setup.capture);

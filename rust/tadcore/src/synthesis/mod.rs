@@ -171,7 +171,7 @@ impl Synthesizer {
         for topology in topologies {
             let mut start = zeros("the gains of one network", problem.rows * problem.size)?;
             search::canonical(problem, topology, &mut start);
-            let candidate = Candidate::new(search::variables(topology), start);
+            let candidate = Candidate::new(search::variables(topology)?, start)?;
             search::admit(&candidate)?;
             candidates.push(candidate);
         }

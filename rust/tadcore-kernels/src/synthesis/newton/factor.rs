@@ -27,7 +27,7 @@ use crate::simd::{Number, Width};
 /// Unknowns from which faer's factorisation may be used.
 const LIBRARY_SIZE: usize = 512;
 /// Unknowns beyond which it goes by blocks, and the columns and rows of one.
-const BLOCKED_SIZE: usize = 1536;
+const BLOCKED_SIZE: usize = 768;
 const BLOCK: usize = 256;
 
 /// What may work on one matrix at a time.

@@ -2,8 +2,12 @@
 
 use super::variables::Variable;
 use crate::cancel::{CancelToken, raised};
+use crate::error::NoMemory;
+use crate::memory::reserve;
 use crate::simd::Number;
 
+/// What asks for memory here.
+const WHAT: &str = "the unknowns of one network";
 /// Entries of a row, for each unknown, from which they are asked for singly.
 const SPARSE: usize = 12;
 /// Rows of a form between two looks at the cancel token.
@@ -62,6 +66,15 @@ pub fn packed(i: usize) -> usize {
 }
 
 impl<T: Number> Layout<T> {
+    /// Makes room for gains of `width` entries, so many of them unknown.
+    #[inline(always)]
+    pub fn reserve(&mut self, width: usize, unknowns: usize) -> Result<(), NoMemory> {
+        self.seen.clear();
+        self.slots.clear();
+        reserve(WHAT, &mut self.seen, width)?;
+        reserve(WHAT, &mut self.slots, unknowns.next_multiple_of(GROUP))
+    }
+
     /// Begins with empty lanes, for `copies` copies of `width` gains.
     #[inline(always)]
     pub fn begin(&mut self, width: usize, copies: usize) {

@@ -27,7 +27,7 @@ use super::objective::Objective;
 use super::tasks::{Limits, Owner, Reached, Tasks};
 use super::workspace::Workspace;
 use crate::cancel::raised;
-use crate::error::NoMemory;
+use crate::error::Stopped;
 use crate::simd::{Number, dot_in_order, take};
 
 /// How much of a Newton step's predicted decrease the steps after it may add, once the prediction holds.
@@ -58,7 +58,7 @@ pub fn minimise<T: Number, O: Objective<T>>(
     limits: Limits,
     backend: Backend,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     let mut descents = Descents::new(objective, tasks, owners, limits, backend, w)?;
     loop {
         descents.refill();
@@ -177,14 +177,15 @@ impl<'a, T: Number, O: Objective<T>> Descents<'a, T, O> {
         limits: Limits,
         backend: Backend<'a>,
         w: &'a mut Workspace<T>,
-    ) -> Result<Self, NoMemory> {
+    ) -> Result<Self, Stopped> {
         let (width, zero, noise_scale) = (objective.width(), T::splat(0.0), T::splat(objective.value_scale()));
         let copies = width / tasks.width().max(1);
         let unknowns = copies * unknowns::<T>(tasks, owners);
         w.grow(width, unknowns)?;
         if limits.iterations > 0 {
-            w.grow_matrices(unknowns)?;
+            w.grow_matrices(unknowns, backend.cancel)?;
         }
+        w.layout.reserve(tasks.width(), unknowns)?;
         w.layout.begin(tasks.width(), copies);
         Ok(Self {
             objective,

@@ -1,9 +1,13 @@
 //! Scratch that is reused from solve to solve.
 
 use super::layout::{GROUP, Layout, packed};
-use crate::error::NoMemory;
+use crate::cancel::{CancelToken, raised};
+use crate::error::{Cancelled, NoMemory, Stopped};
 use crate::memory;
 use crate::simd::Number;
+
+/// Numbers that are filled between two looks at the cancel token.
+const PIECE: usize = 1 << 22;
 
 /// The memory of descents side by side.
 #[derive(Debug)]
@@ -68,11 +72,24 @@ impl<T: Number> Workspace<T> {
 
     /// Makes room for a Hessian and its factor.
     #[inline(always)]
-    pub fn grow_matrices(&mut self, unknowns: usize) -> Result<(), NoMemory> {
+    pub fn grow_matrices(&mut self, unknowns: usize, cancel: Option<&CancelToken>) -> Result<(), Stopped> {
         let unknowns = unknowns.next_multiple_of(GROUP);
-        room(&mut self.hessian, packed(unknowns))?;
-        room(&mut self.factor, unknowns * unknowns)
+        by_pieces(&mut self.hessian, packed(unknowns), cancel)?;
+        by_pieces(&mut self.factor, unknowns * unknowns, cancel)
     }
+}
+
+/// The same of what may take a second to be filled.
+fn by_pieces<T: Number>(numbers: &mut Vec<T>, len: usize, cancel: Option<&CancelToken>) -> Result<(), Stopped> {
+    let more = len.saturating_sub(numbers.len());
+    memory::reserve_exact("the synthesis of one network", numbers, more)?;
+    while numbers.len() < len {
+        if raised(cancel) {
+            return Err(Cancelled.into());
+        }
+        numbers.resize(len.min(numbers.len() + PIECE), T::splat(0.0));
+    }
+    Ok(())
 }
 
 fn room<T: Number>(numbers: &mut Vec<T>, len: usize) -> Result<(), NoMemory> {

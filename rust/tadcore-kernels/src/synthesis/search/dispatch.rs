@@ -7,7 +7,7 @@
 use std::any::Any;
 
 use crate::cancel::CancelToken;
-use crate::error::{NoMemory, Stopped};
+use crate::error::Stopped;
 use crate::simd::{Number, Width, dispatch, widened};
 use crate::synthesis::newton::{Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, minimise, unknowns};
 use crate::synthesis::theta::{Certificate, Coefficients, Doubled, Precisions, RealGains};
@@ -163,7 +163,7 @@ pub fn single(problem: &Precisions) -> bool {
 
 dispatch! {
     /// As many descents side by side as a register holds.
-    fn several_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
+    fn several_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), Stopped> {
         if const { V::SIZED } {
             descend::<V::Double, N>(coefficients, list, scratch.of())
         } else {
@@ -174,7 +174,7 @@ dispatch! {
 
 dispatch! {
     /// The same in single precision.
-    fn several_single<V, const N: usize>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
+    fn several_single<V, const N: usize>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), Stopped> {
         if const { !V::SIZED } {
             any_size::<f32>(coefficients, list, scratch.of())
         } else if list.kind == Kind::Doubled {
@@ -187,7 +187,7 @@ dispatch! {
 
 widened! {
     /// One descent after another.
-    fn one_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
+    fn one_double<V, const N: usize>(coefficients: &Coefficients<f64>, list: &mut List, scratch: &mut Scratch) -> Result<(), Stopped> {
         if const { !V::SIZED } {
             any_size::<f64>(coefficients, list, scratch.of())
         } else if const { side_by_side(N) } || list.kind != Kind::Doubled {
@@ -200,7 +200,7 @@ widened! {
 
 widened! {
     /// The same in single precision: seldom enough for one version for all sizes.
-    fn one_single<V>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), NoMemory> {
+    fn one_single<V>(coefficients: &Coefficients<f32>, list: &mut List, scratch: &mut Scratch) -> Result<(), Stopped> {
         if const { V::SIZED } {
             run::<f32, 0>(coefficients, list, scratch.of())
         } else {
@@ -214,7 +214,7 @@ fn any_size<T: Number>(
     coefficients: &Coefficients<T::Scalar>,
     list: &mut List,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     run::<T, 0>(coefficients, list, w)
 }
 
@@ -223,7 +223,7 @@ fn run<T: Number, const N: usize>(
     coefficients: &Coefficients<T::Scalar>,
     list: &mut List,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     match list.kind {
         Kind::Doubled => descend_doubled::<T, N>(coefficients, list, w),
         _ => descend::<T, N>(coefficients, list, w),
@@ -235,7 +235,7 @@ fn descend_doubled<T: Number, const N: usize>(
     coefficients: &Coefficients<T::Scalar>,
     list: &mut List,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     let mut doubled = Doubled::<T, N>::new(coefficients, list.backend.cancel)?;
     minimise(&mut doubled, list.tasks, list.owners, list.limits, list.backend, w)
 }
@@ -245,7 +245,7 @@ fn descend<T: Number, const N: usize>(
     coefficients: &Coefficients<T::Scalar>,
     list: &mut List,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     let mut real = RealGains::<T, N>::new(coefficients, list.backend.cancel)?;
     minimise(&mut real, list.tasks, list.owners, list.limits, list.backend, w)?;
     if !T::SINGLE && list.kind == Kind::Certified {
@@ -262,9 +262,9 @@ fn certify<T: Number, const N: usize>(
     owners: &[Owner],
     backend: Backend,
     w: &mut Workspace<T>,
-) -> Result<(), NoMemory> {
+) -> Result<(), Stopped> {
     let width = real.width();
-    w.grow_matrices(unknowns::<T>(tasks, owners))?;
+    w.grow_matrices(unknowns::<T>(tasks, owners), backend.cancel)?;
     let mut first = 0;
     while first < tasks.len() {
         let last = tasks.len().min(first + T::LANES);

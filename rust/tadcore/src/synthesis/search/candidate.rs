@@ -1,5 +1,7 @@
 //! A network that is being solved: its variables, the best gains found so far, and the start that led to them.
 
+use crate::error::NoMemory;
+use crate::memory::copy;
 use crate::simd::norm;
 use crate::synthesis::newton::{Incumbent, Owner, Reached, Variable};
 
@@ -42,19 +44,19 @@ pub(crate) struct Candidate {
 
 impl Candidate {
     /// A network that starts from `start`.
-    pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Self {
+    pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Result<Self, NoMemory> {
         let complete = variables.len() == start.len();
-        Self {
+        Ok(Self {
             variables,
             complete,
-            g: start.clone(),
+            g: copy("the gains of one network", &start)?,
             initial: start,
             reached: Reached::default(),
             start: Start::Canonical,
             certified: false,
             iterations: 0,
             quick: false,
-        }
+        })
     }
 
     pub(crate) fn owner(&self) -> Owner<'_> {

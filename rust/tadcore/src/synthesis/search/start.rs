@@ -7,14 +7,17 @@
 //! The canonical start is the orthogonal projection of the FNE rows on these spaces: the minimiser of the ‖S‖² terms
 //! alone. It depends on (t_k, topology) and on nothing else.
 
+use crate::error::NoMemory;
+use crate::memory::reserve;
 use crate::network::Topology;
 use crate::synthesis::newton::Variable;
 use crate::synthesis::theta::Problem;
 
 /// The variables of `topology`, row by row.
-pub(crate) fn variables(topology: &Topology) -> Vec<Variable> {
+pub(crate) fn variables(topology: &Topology) -> Result<Vec<Variable>, NoMemory> {
     // At most all that are seen and, in each row, the player itself.
-    let mut out = Vec::with_capacity(topology.edges() + topology.rows());
+    let mut out = Vec::new();
+    reserve("the unknowns of one network", &mut out, topology.edges() + topology.rows())?;
     let n = topology.size();
     for i in 0..topology.rows() {
         let own = i * n + i;
@@ -25,7 +28,7 @@ pub(crate) fn variables(topology: &Topology) -> Vec<Variable> {
             }
         }
     }
-    out
+    Ok(out)
 }
 
 /// The paper's own variables, the entries of K_i: e_j − e_i for each player seen, e_i when the attacker is seen.

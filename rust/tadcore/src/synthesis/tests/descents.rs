@@ -110,7 +110,7 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
             let topology = Topology::from_key(m, n, key);
             let mut g = vec![0.0; m * n];
             canonical(&problem, &topology, &mut g);
-            visit(&problem, &variables(&topology), &g);
+            visit(&problem, &variables(&topology).expect("memory"), &g);
         }
     }
 }

@@ -11,7 +11,7 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
     let (dispatcher, tasks) = (&mut Dispatcher::default(), &mut Tasks::default());
     let mut start = vec![0.0; problem.rows * problem.size];
     canonical(problem, topology, &mut start);
-    let candidate = Candidate::new(variables(topology), start);
+    let candidate = Candidate::new(variables(topology).expect("memory"), start).expect("memory");
     let owners = [Owner { variables: &candidate.variables, incumbent: None }];
     let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
     let scale = problem.theta.double.scale.fne;
