@@ -124,7 +124,7 @@ fuzz_target!(|input: Input| {
         Ok(costs) => assert!(costs.iter().all(|j| j.is_finite()), "a cost is not finite"),
         Err(error) => assert!(matches!(error, RunError::Cost { .. } | RunError::Cancelled(_)), "{error}"),
     }
-    assert!(record.steps <= last, "the run is longer than the game");
+    assert!(record.steps <= record.end && record.end <= last, "the run is longer than the game");
     if let Outcome::Intercepted(i) = record.outcome {
         assert!(i < n, "there is no such defender");
     }

@@ -35,6 +35,7 @@ from .errors import (
     WorkerError as WorkerError,
 )
 from .game.changes import NetworkChange as NetworkChange
+from .game.divergence import Divergence as Divergence
 from .game.equilibrium import Equilibrium as Equilibrium, solve_equilibrium as solve_equilibrium
 from .game.network import VisibilityNetwork as VisibilityNetwork
 from .game.outcome import Outcome as Outcome, OutcomeKind as OutcomeKind

@@ -77,8 +77,8 @@ class Game:
         continuous: bool = False,
         passes: bool = False,
         threads: int | None = None,
-    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
-        """Kind, defender, time, and whether it passed within a radius between instants."""
+    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Kind, defender, time, whether the game diverged, and whether it passed within a radius between instants."""
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
     def table_length(self, start: bytes) -> int:
@@ -137,7 +137,10 @@ class Gains:
 
 @final
 class Record:
-    """One recorded run; L = steps taken, rows 0…L, the last the terminal state."""
+    """One recorded run; L = steps taken, rows 0…L, the last the terminal state.
+
+    Where a game that diverged leaves the range of double precision, the record stops before its end.
+    """
 
     @property
     def kind(self) -> int: ...
@@ -145,6 +148,9 @@ class Record:
     def defender(self) -> int: ...
     @property
     def time(self) -> float: ...
+    @property
+    def diverged(self) -> tuple[float, float] | None: ...
+    """The instant of the divergence, and the largest size over that of the start."""
     @property
     def times(self) -> NDArray[np.float64]: ...
     @property

@@ -55,6 +55,10 @@ MUTANTS = {
         ),
         ("z = X − X_a", ".map(|(x, a)| «x - a»)", "x + a"),
     ],
+    "simulation/divergence.rs": [
+        ("divergence: the largest distance at the start", "most.max(«squared_distance(a, b)»)", "0.0"),
+        ("divergence: the bound", "«DIVERGED * DIVERGED» * scale", "DIVERGED"),
+    ],
     "simulation/record.rs": [
         ("attacker by its own row", "for_each(|(x, d)| «*x += d»)", "*x -= d"),
         ("X = z + X_a", ".map(|(x, a)| «x + a»)", "x - a"),
@@ -140,7 +144,8 @@ MUTANTS = {
         ("batches: lane of a half", "let lane = «4 * half + l»;", "l"),
         ("batches: rows as columns", "«V::transpose(next[x][q])»", "next[x][q]"),
         ("batches: row of a result", "z[(«4 * q + r») * D + x]", "r"),
-        ("batches: caught among who play", "«u32::from(caught) & playing(blocks.live, block)»", "u32::from(caught)"),
+        ("batches: over among who play", "«u32::from(over) & playing(blocks.live, block)»", "u32::from(over)"),
+        ("batches: the furthest player", "«most.or_larger(d2)»", "d2"),
         ("batches: block that moves", "blocks.z[«first * N * D»..]", "0"),
         ("batches: key of a half", "direct[«low[half]» as usize", "low[1 - half]"),
         ("batches: next key", "low[half] >>= «16»;", "8"),
@@ -152,6 +157,7 @@ MUTANTS = {
         ("batches, any size: bit", "let bit = «row * n + column»;", "column * n + row"),
         ("batches, any size: who sees whom", "u64::from(«d2[l] <= sight[row][l]»)", "d2[l] < sight[row][l]"),
         ("batches, any size: who is caught", "u32::from(«d2[l] <= capture[i][l]»)", "d2[l] < capture[i][l]"),
+        ("batches, any size: the furthest player", "most[l] = if «i == 0 || most[l] < d2[l]»", "i == 0"),
         ("batches, any size: exp(Cδ) z", "*sum += «c * value»;", "-c * value"),
         ("batches, any size: row of a result", "z[«a * d + x»][l]", "x"),
     ],

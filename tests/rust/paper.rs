@@ -139,7 +139,7 @@ fn batches_are_runs_whatever_the_threads_and_the_budget() {
     assert_eq!(one, bounded);
     let stats = small.table();
     assert!(stats.bytes <= 100_000 && stats.entries > 0, "{stats:?}");
-    for (i, &End { outcome, step: steps, .. }) in one.iter().enumerate() {
+    for (i, end) in one.iter().enumerate() {
         let setup = Setup {
             dim: 2,
             positions: &positions[i * 10..(i + 1) * 10],
@@ -147,7 +147,7 @@ fn batches_are_runs_whatever_the_threads_and_the_budget() {
             capture: &start.capture,
         };
         let record = simulate(&large, &setup, &cancel).expect("a run");
-        assert_eq!((record.outcome, record.steps), (outcome, steps), "trial {i}");
+        assert_eq!(End::from(&record), *end, "trial {i}");
     }
     let kinds: std::collections::HashSet<i8> = one.iter().map(|end| end.outcome.code()).collect();
     assert!(kinds.len() >= 2, "the sample should end in more than one way");

@@ -23,7 +23,7 @@ from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import as_scenario
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import OutcomeKind, kind_counts
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
 from tadcore.simulation.batch import simulate_batch
@@ -55,7 +55,8 @@ class OutcomeMap:
     player : str
         Whose start varies.
     dataset : xarray.Dataset
-        ``kind`` (int8), ``defender`` (int32) and ``time`` (float64) over (y, x), coded as in `tadcore.Batch`.
+        ``kind`` (int8), ``defender`` (int32), ``time`` (float64) and ``diverged`` (bool) over (y, x), coded as in
+        `tadcore.Batch`.
     """
 
     scenario: Scenario
@@ -63,9 +64,8 @@ class OutcomeMap:
     dataset: xarray.Dataset
 
     def counts(self) -> dict[str, int]:
-        """How many places of the grid lead to each kind of outcome."""
-        kind = self.dataset["kind"].values
-        return {code.name.lower(): int(np.count_nonzero(kind == code)) for code in OutcomeKind}
+        """How many places of the grid lead to each kind of outcome; those that diverge, if any, are counted apart."""
+        return kind_counts(self.dataset["kind"].values, self.dataset["diverged"].values)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the map; see `tadcore.plotting.outcome_map`."""
@@ -158,8 +158,8 @@ def outcome_map(
     who = sc.players.index(player)
     shape = (len(rows), len(columns))
     kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
-    time = np.empty(shape)
-    flat: list[NDArray[Any]] = [kind.reshape(-1), defender.reshape(-1), time.reshape(-1)]
+    time, diverged = np.empty(shape), np.empty(shape, dtype=np.bool_)
+    flat: list[NDArray[Any]] = [array.reshape(-1) for array in (kind, defender, time, diverged)]
     starts = range(0, kind.size, _BLOCK)
     for start in bar(starts, f"map of {player}", show=progress):
         block = slice(start, min(start + _BLOCK, kind.size))
@@ -170,7 +170,7 @@ def outcome_map(
         if up is not None:
             positions[:, who, 2] = up
         batch = simulate_batch(sc, positions, threads=threads)
-        for whole, part in zip(flat, (batch.kind, batch.defender, batch.time), strict=True):
+        for whole, part in zip(flat, (batch.kind, batch.defender, batch.time, batch.diverged), strict=True):
             whole[block] = part
     codes = ", ".join(f"{code.value} {code.name.lower()}" for code in OutcomeKind)
     return OutcomeMap(
@@ -181,6 +181,7 @@ def outcome_map(
                 "kind": (("y", "x"), kind, {"long_name": f"outcome: {codes}"}),
                 "defender": (("y", "x"), defender, {"long_name": "intercepting defender, 0-based; -1 where none"}),
                 "time": (("y", "x"), time, {"long_name": "instant of the end", "units": "1"}),
+                "diverged": (("y", "x"), diverged, {"long_name": "whether the game diverged, before its end or at it"}),
             },
             coords={
                 "x": ("x", columns, {"long_name": f"initial x of {player}", "units": "1"}),

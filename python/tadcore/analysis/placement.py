@@ -57,7 +57,8 @@ class ProbabilityMap:
         Confidence level.
     dataset : xarray.Dataset
         ``count``, ``estimate``, ``low``, ``high`` (at each place by itself), ``band_low`` and ``band_high`` (at all
-        places at once, for one outcome), over (outcome, y, x).
+        places at once, for one outcome), over (outcome, y, x). The last outcome is ``"diverged"`` where some trials
+        did; they are in no other.
     """
 
     scenario: Scenario
@@ -74,7 +75,7 @@ class ProbabilityMap:
         Parameters
         ----------
         outcome : str
-            ``"timeout"``, ``"captured"``, ``"intercepted"``, or ``"d1"`` … ``"dn"``.
+            ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` … ``"dn"``, or, where some did, ``"diverged"``.
 
         Returns
         -------
@@ -86,7 +87,9 @@ class ProbabilityMap:
         ScenarioError
             No such outcome.
         """
-        here = self.dataset.sel(outcome=as_outcome(outcome, self.scenario.n))
+        if outcome not in self.dataset["outcome"].values:
+            raise ScenarioError("outcome", outcome, f"one of {', '.join(map(str, self.dataset['outcome'].values))}")
+        here = self.dataset.sel(outcome=outcome)
         row, column = np.unravel_index(int(here["estimate"].values.argmax()), here["estimate"].shape)
         place = here.isel(y=int(row), x=int(column))
         found = {"x": place["x"], "y": place["y"], "estimate": place["estimate"]}
@@ -176,11 +179,12 @@ def probability_map(
     if up is not None:
         places = np.column_stack([places, np.full(len(places), up)])
     together = max(1, _BLOCK // games.trials)
-    count = np.empty((len(outcome_names(sc.n)), len(places)), dtype=np.int64)
+    count = np.empty((len(outcome_names(sc.n, diverged=True)), len(places)), dtype=np.int64)
     for first in bar(range(0, len(places), together), f"probability map of {games.player}", show=progress):
         block = slice(first, first + together)
         count[:, block] = games.events(places[block]).sum(axis=2)
-    names = outcome_names(sc.n)
+    names = outcome_names(sc.n, diverged=bool(count[-1].any()))
+    count = count[: len(names)]
     method: Method = "exact" if stopping is None else "sequence"
     low, high = ends(count, games.trials, 1.0 - confidence, method)
     band_low, band_high = band(count, games.trials, 1.0 - confidence, len(places), method)
@@ -339,7 +343,8 @@ def best_start(
     for one in (study, again):
         one.check(progress=progress)
     games = Placed(study, player, threads)
-    which = outcome_names(games.sc.n).index(as_outcome(outcome, games.sc.n))
+    names = outcome_names(games.sc.n, diverged=True)
+    which = names.index(as_outcome(outcome, games.sc.n))
     bounds = _bounds(games.sc, x, y, z)
     steps = iter(bar(range(most), f"best start of {games.player}", show=progress))
     played = 0
@@ -361,7 +366,7 @@ def best_start(
     gain_low, gain_high = difference_interval(better, worse, fresh.trials, level=confidence)
     return BestStart(
         player=games.player,
-        outcome=outcome_names(games.sc.n)[which],
+        outcome=names[which],
         position=tuple(map(float, found.x)),
         estimate=hits / fresh.trials,
         low=float(low),
@@ -379,7 +384,7 @@ def best_start(
 
 def as_outcome(name: str, n: int) -> str:
     """The name of an outcome of a game of n defenders."""
-    names = outcome_names(n)
+    names = outcome_names(n, diverged=True)
     if name not in names:
         raise ScenarioError("outcome", name, f"one of {', '.join(names)}")
     return name

@@ -24,11 +24,12 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
+from tadcore.simulation.batch import Batch
 from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
 from tadcore.statistics.intervals import band, ends
@@ -110,11 +111,16 @@ def radius_curve(
     same = np.flatnonzero(grid == own)
     base = played[same[0]] if same.size else games.play(own)
 
-    at_reference = indicators(base.kind, base.defender, sc.n)
+    lost = any(batch.diverged.any() for batch in (base, *played))
+
+    def events(batch: Batch) -> NDArray[np.bool_]:
+        return indicators(batch.kind, batch.defender, sc.n, batch.diverged if lost else None)
+
+    at_reference = events(base)
     counts, against_reference, against_last = [], [], []
     last = at_reference
     for batch in played:  # one set of indicators at a time: they are the largest arrays here
-        event = indicators(batch.kind, batch.defender, sc.n)
+        event = events(batch)
         counts.append(event.sum(axis=1))
         against_reference.append(discordant(event, at_reference))
         against_last.append(discordant(event, last))
@@ -130,7 +136,7 @@ def radius_curve(
         player=games.player,
         radius=kind,
         radii=grid,
-        names=outcome_names(sc.n),
+        names=outcome_names(sc.n, diverged=lost),
         estimate=count / len(rows),
         low=low,
         high=high,
@@ -145,6 +151,7 @@ def radius_curve(
         slope_high=slope[2],
         kind=np.array([batch.kind for batch in played]),
         defender=np.array([batch.defender for batch in played]),
+        diverged=np.array([batch.diverged for batch in played]),
         level=confidence,
         breakpoints=breakpoints(games, grid, played, tolerance) if refine else None,
         rule="" if stopping is None else str(stopping),

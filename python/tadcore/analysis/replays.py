@@ -96,7 +96,7 @@ class Placed:
         return len(self.rows)
 
     def events(self, places: Floats) -> NDArray[np.bool_]:
-        """Which trials ended in each outcome from each place (L, dim): shape (3 + n, L, M)."""
+        """Which trials ended in each outcome from each place (L, dim), last those that diverged: (4 + n, L, M)."""
         positions = np.tile(self.rows.positions, (len(places), 1, 1))
         positions[:, self.row] = np.repeat(places, self.trials, axis=0)
         sight, capture = (
@@ -104,5 +104,5 @@ class Placed:
             for radii in (self.rows.visibility_radii, self.rows.capture_radii)
         )
         batch = simulate_batch(self.sc, positions, sight, capture, threads=self.threads)
-        events = indicators(batch.kind, batch.defender, self.sc.n)
+        events = indicators(batch.kind, batch.defender, self.sc.n, batch.diverged)
         return events.reshape(len(events), len(places), self.trials)

@@ -43,7 +43,8 @@ def sensitivity(
     seed : int
         Of the points and of the bootstrap.
     outputs : sequence of str
-        Outcomes, ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` …, and ``"time"``, when the game ends.
+        Outcomes, ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` … and ``"diverged"``, and ``"time"``, when
+        the game ends; the end of a game that diverged is a timeout as a rule, at T.
     level : float
         Confidence level of each interval.
     resamples : int
@@ -67,7 +68,7 @@ def sensitivity(
     as_scenario(sc)
     if not isinstance(inputs, Mapping):
         raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
-    known = (*outcome_names(sc.n), "time")
+    known = (*outcome_names(sc.n, diverged=True), "time")
     if isinstance(outputs, str) or not isinstance(outputs, Iterable):
         raise ScenarioError("outputs", outputs, f"a sequence of names, each one of {', '.join(known)}")
     wanted = tuple(outputs)
@@ -83,7 +84,7 @@ def sensitivity(
     def play(x: Floats) -> Floats:
         rows = rows_of(sc, dict(zip(inputs, x, strict=True)), x.shape[1])
         batch = simulate_batch(sc, rows.positions, rows.visibility_radii, rows.capture_radii, threads=threads)
-        found = np.vstack([indicators(batch.kind, batch.defender, sc.n), batch.time])
+        found = np.vstack([indicators(batch.kind, batch.defender, sc.n, batch.diverged), batch.time])
         return np.asarray(found[[known.index(output) for output in wanted]], dtype=np.float64)
 
     return sobol(play, inputs, wanted, points=points, seed=seed, level=level, resamples=resamples)

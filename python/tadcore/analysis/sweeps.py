@@ -19,13 +19,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tadcore.errors import NoEquilibriumError, ScenarioError
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.scenario.paths import expand, normal, short
+from tadcore.statistics.intervals import ends
 from tadcore.study.collect import StoppingRule
 from tadcore.study.study import Study, StudyResult
 
 if TYPE_CHECKING:
     import xarray
+
+_LEVEL = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +90,18 @@ class SweepResult:
             Its dimensions are the swept paths, in normal form, and ``outcome``; a defender's path is there in its
             short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count``, ``probability`` (the
             share of the trials) with the ends ``low`` and ``high`` of its 95 % interval (as `StudyResult.probabilities`
-            has it, in each cell by itself) and ``mean_time`` of every outcome, ``trials``, ``mean_end`` (the mean time
-            of all games) and ``escape_time``; ``status`` is a coordinate. Where a cell has no equilibrium, counts are 0
-            and shares and times NaN; ``escape_time`` is NaN everywhere else.
+            has it, in each cell by itself) and ``mean_time`` of every outcome (with ``"diverged"`` where games did in
+            some cell), ``trials``, ``mean_end`` (the mean time of all games) and ``escape_time``; ``status`` is a
+            coordinate. Where a cell has no equilibrium, counts are 0 and shares and times NaN; ``escape_time`` is NaN
+            everywhere else.
         """
         import xarray as xr
 
         from tadcore.scenario.provenance import provenance
 
-        kinds = sorted(OutcomeKind)
-        rows = [_summary(cell.result, kinds) for cell in self.cells]
+        lost = any(cell.result is not None and cell.result.diverged.any() for cell in self.cells)
+        names = [*(kind.name.lower() for kind in OutcomeKind), *([DIVERGED] if lost else [])]
+        rows = [_summary(cell.result, len(names)) for cell in self.cells]
 
         def over(values: Sequence[Any]) -> Any:
             array = np.array(values)
@@ -117,7 +122,7 @@ class SweepResult:
             },
             coords={
                 **{path: _labels(values) for path, values in self.grid.items()},
-                "outcome": [kind.name.lower() for kind in kinds],
+                "outcome": names,
                 "status": (dims, over([cell.status for cell in self.cells])),
             },
             attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
@@ -130,7 +135,9 @@ class SweepResult:
     def __repr__(self) -> str:
         size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())
         without = sum(cell.result is None for cell in self.cells)
-        return f"SweepResult({size}{f'; {without} without equilibrium' if without else ''})"
+        lost = sum(int(cell.result.diverged.sum()) for cell in self.cells if cell.result is not None)
+        said = [f"; {without} without equilibrium"] if without else []
+        return f"SweepResult({size}{''.join(said)}{f'; {lost:,} games diverged' if lost else ''})"
 
 
 def sweep(
@@ -248,16 +255,18 @@ def _folder(point: Mapping[str, Any]) -> str:
     return f"{readable}-{hashlib.sha256(exact.encode()).hexdigest()[:8]}"
 
 
-def _summary(result: StudyResult | None, kinds: Sequence[OutcomeKind]) -> tuple[Any, Any, Any, float]:
-    """Counts, shares with their intervals, and mean times by outcome, and the mean time of all."""
+def _summary(result: StudyResult | None, many: int) -> tuple[Any, Any, Any, float]:
+    """Counts, shares with their intervals, and mean times by outcome, the fourth being divergence; all mean times."""
     if result is None:
-        nothing = np.full(len(kinds), np.nan)
-        return np.zeros(len(kinds), dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
-    counts = np.bincount(result.kind, minlength=len(kinds))
-    total = np.bincount(result.kind, weights=result.time, minlength=len(kinds))
-    means = np.divide(total, counts, out=np.full(len(kinds), np.nan), where=counts > 0)
-    found = result.probabilities(level=0.95)
-    shares = [values[: len(kinds)] for values in (found.estimate, found.low, found.high)]
+        nothing = np.full(many, np.nan)
+        return np.zeros(many, dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
+    code = np.where(result.diverged, len(OutcomeKind), result.kind)
+    counts = np.bincount(code, minlength=many)
+    total = np.bincount(code, weights=result.time, minlength=many)
+    means = np.divide(total, counts, out=np.full(many, np.nan), where=counts > 0)
+    method = result.probabilities(level=_LEVEL).method
+    error = (1.0 - _LEVEL) / (len(OutcomeKind) if method == "sequence" else 1)
+    shares = [counts / result.trials, *ends(counts, result.trials, error, method)]
     return counts, shares, means, float(result.time.mean())
 
 

@@ -1,8 +1,8 @@
 # ruff: noqa: D301 (the help text marks a block that keeps its lines with a backspace character)
 """The command line: its commands, its exit codes, and how errors are printed.
 
-Exit codes: 0 done; 1 the game has no equilibrium, or a check failed; 2 bad input; 3 no check failed, but some could not
-be decided.
+Exit codes: 0 done; 1 the game has no equilibrium or diverges, or a check failed; 2 bad input; 3 no check failed, but
+some could not be decided.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback(
-    epilog="Exit codes: 0 done; 1 the game has no equilibrium, or a check failed; 2 bad input; 3 no check failed, but "
-    "some could not be decided.",
+    epilog="Exit codes: 0 done; 1 the game has no equilibrium or diverges, or a check failed; 2 bad input; 3 no check "
+    "failed, but some could not be decided.",
 )
 def _top(
     version: Annotated[

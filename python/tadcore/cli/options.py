@@ -15,7 +15,7 @@ from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
 FAILED = 1
-"""The exit code of a game without an equilibrium, and of a check that failed."""
+"""The exit code of a game without an equilibrium, of one that diverges, and of a check that failed."""
 
 UNDECIDED = 3
 """The exit code of a verification in which nothing failed and something could not be decided."""

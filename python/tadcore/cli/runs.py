@@ -63,6 +63,9 @@ def simulate(
         _draw(run, out)
     if out is not None:
         say(f"written to {out}")
+    if run.diverged is not None:
+        complain(f"the game {run.diverged}; how it ends says nothing of a pursuit")
+        raise typer.Exit(FAILED)
     if not run.converged:
         complain(f"the gains of {run.unconverged} instants did not converge")
         raise typer.Exit(FAILED)
@@ -104,7 +107,8 @@ def _lines(run: Any, most: int = 20) -> list[str]:
     changes = run.network_changes
     passes = [f"between instants: {each}" for each in run.passes[:most]]
     passes += [f"  … and {len(run.passes) - most} more passes"] if len(run.passes) > most else []
-    lines = [str(run.outcome), *passes, "network:"]
+    lost = [] if run.diverged is None else [f"the game {run.diverged}"]
+    lines = [str(run.outcome), *lost, *passes, "network:"]
     for change in changes[:most]:
         edges = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
         lines.append(f"  t = {change.time:<8.10g} {'  '.join(edges) or 'no edges'}")

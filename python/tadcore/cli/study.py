@@ -47,7 +47,7 @@ def study(
 
     Samplers: box, disk, annulus, gaussian, values, cycle, scipy. Designs: random, sobol, latin.
     """
-    from tadcore.game.outcome import OutcomeKind
+    from tadcore.statistics.outcomes import excluding
     from tadcore.study.manifest import Manifest
     from tadcore.study.study import Study
 
@@ -64,7 +64,8 @@ def study(
         raise typer.Exit(_INTERRUPTED) from None
     found = result.probabilities()
     say(f"{result.trials:,} trials")
-    for name, count, share, interval in found.rows()[: len(OutcomeKind)]:
+    for i in excluding(found.names):
+        name, count, share, interval = found.rows()[i]
         say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
     say(f"intervals: {percent(found.level)} ({found.method})", indent=2)
     say(f"written to {store}")

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.network import Edge, edges_of
+from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.scenario.model import Scenario
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.run import simulate
 
 MOST_POINTS = 400
 """No curve goes to the browser with more points than about this."""
@@ -39,7 +41,7 @@ class Explorer:
 
     def __init__(self, sc: Scenario) -> None:
         self.scenario = sc
-        self.run: Run = simulate(sc)
+        self.run: Recorded = until_divergence(simulate(sc))
         self.time = self.run.outcome.time
         self.plane = (0, 1)
         self.preview = False
@@ -143,7 +145,7 @@ class Explorer:
 
     def _play(self, scenario: Scenario, played: Scenario, *, preview: bool) -> None:
         at_end = math.isclose(self.time, self.run.outcome.time)
-        self.run = simulate(played)
+        self.run = until_divergence(simulate(played))
         self.scenario, self.preview = scenario, preview
         self.look_at(self.run.outcome.time if at_end else self.time)
 

@@ -117,7 +117,7 @@ class Page:
         self.sources["theta"].data = {"t": times, "theta": run.theta[at].tolist()}
         self._trace()
         said = f" (a preview in steps of {run.scenario.step:g})" if explorer.preview else ""
-        self.status.text = f"<b>{escape(str(run.outcome))}</b>{said}"
+        self.status.text = f"<b>{escape(str(run.diverged or run.outcome))}</b>{said}"
         self._quiet = True
         self.time.end = run.outcome.time or explorer.scenario.step
         self.time.value = explorer.time

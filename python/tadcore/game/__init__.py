@@ -2,6 +2,7 @@
 
 from .changes import Interval, NetworkChange
 from .chattering import Chatter
+from .divergence import Divergence
 from .equilibrium import Equilibrium, solve_equilibrium
 from .network import VisibilityNetwork
 from .outcome import Outcome, OutcomeKind
@@ -10,6 +11,7 @@ from .synthesis import Gains, synthesize
 
 __all__ = [
     "Chatter",
+    "Divergence",
     "Equilibrium",
     "Gains",
     "Interval",

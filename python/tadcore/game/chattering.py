@@ -49,9 +49,10 @@ def chatter(run: Recorded) -> tuple[Chatter, ...]:
     Returns
     -------
     tuple of Chatter
-        Stretches of at least six flips of one edge, never more than five steps apart, in order of time.
+        Stretches of at least six flips of one edge, never more than five steps apart, in order of time; none after the
+        game diverged.
     """
-    length = len(run.times) - 1
+    length = len(run.times) - 1 if run.diverged is None else int(np.searchsorted(run.times, run.diverged.time))
     flips = run.adjacency[1:length] != run.adjacency[: length - 1]
     found = []
     for i, j in np.argwhere(flips.any(axis=0)).tolist():

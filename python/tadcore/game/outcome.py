@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 class OutcomeKind(enum.IntEnum):
@@ -30,26 +33,42 @@ class Outcome:
         The intercepting defender, 0-based; None where none intercepted.
     time : float
         The instant, dimensionless as T.
+    diverged : bool
+        Whether the game had diverged by then, so that this end says nothing (`Divergence`); statistics count it apart.
+        Two outcomes that differ in this alone are equal.
     """
 
     kind: Literal["timeout", "captured", "intercepted"]
     defender: int | None
     time: float
+    diverged: bool = field(default=False, compare=False)
 
     @classmethod
-    def of(cls, code: int, defender: int, time: float) -> Outcome:
+    def of(cls, code: int, defender: int, time: float, *, diverged: bool = False) -> Outcome:
         """From the codes of a batch: an `OutcomeKind` and a 0-based index, -1 where no defender intercepted."""
         kinds: dict[OutcomeKind, Literal["timeout", "captured", "intercepted"]] = {
             OutcomeKind.TIMEOUT: "timeout",
             OutcomeKind.CAPTURED: "captured",
             OutcomeKind.INTERCEPTED: "intercepted",
         }
-        return cls(kinds[OutcomeKind(code)], None if defender < 0 else int(defender), float(time))
+        return cls(kinds[OutcomeKind(code)], None if defender < 0 else int(defender), float(time), diverged)
 
     def __str__(self) -> str:
-        when = f"t = {self.time:.10g}"
+        when = f"t = {self.time:.10g}" + (", after the game diverged" if self.diverged else "")
         if self.kind == "timeout":
             return f"time runs out at {when}"
         if self.kind == "captured":
             return f"the attacker captures the target at {when}"
         return f"d{(self.defender or 0) + 1} intercepts the attacker at {when}"
+
+
+DIVERGED = "diverged"
+"""What tables call the games that diverged, beside the kinds of ends."""
+
+
+def kind_counts(kind: NDArray[Any], diverged: NDArray[np.bool_]) -> dict[str, int]:
+    """How many games ended in each way, by the name of the kind; those that diverged, if any, apart and last."""
+    sound = kind[~diverged]
+    counts = {code.name.lower(): int(np.count_nonzero(sound == code)) for code in OutcomeKind}
+    lost = int(np.count_nonzero(diverged))
+    return counts | {DIVERGED: lost} if lost else counts

@@ -15,6 +15,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.scenario.model import Scenario
 
 from .changes import Interval, NetworkChange
+from .divergence import Divergence
 from .outcome import Outcome
 
 
@@ -28,6 +29,10 @@ class Recorded(Protocol):
     @property
     def outcome(self) -> Outcome:
         """How it ended."""
+
+    @property
+    def diverged(self) -> Divergence | None:
+        """When it diverged; None where it did not."""
 
     @property
     def times(self) -> Floats:

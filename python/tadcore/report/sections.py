@@ -16,7 +16,7 @@ from tadcore._shared.shares import percent
 from tadcore.plotting.tools.axes import for_files
 from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
-from tadcore.statistics.outcomes import indicators
+from tadcore.statistics.outcomes import diverged_of, indicators, is_defender
 from tadcore.statistics.stopping import stopping_of
 
 from .parts import Code, Picture, Reported, Row, Section, Table
@@ -42,6 +42,12 @@ def notes(result: Reported) -> list[str]:
     elif result.trials < asked:
         found.append(
             f"{result.trials:,} of {asked:,} trials are there: the study was stopped or cut off before its end."
+        )
+    lost = diverged_of(result)
+    if lost is not None:
+        found.append(
+            f"{int(lost.sum()):,} of {result.trials:,} trials diverged: the players parted without bound, by more than "
+            "1000 times the size of their start. They are counted as diverged alone, however they then ended."
         )
     if design != "random":
         found.append(
@@ -69,7 +75,9 @@ def times(result: Reported, level: float | None) -> Section:
     sc = result.scenario
     found = statistics.incidence_of(result, level=level)
     rows = []
-    for name, ended in zip(found.names, indicators(result.kind, result.defender, sc.n), strict=True):
+    for name, ended in zip(
+        found.names, indicators(result.kind, result.defender, sc.n, diverged_of(result)), strict=True
+    ):
         if ended.any():
             cells = [f"{t:.6g}" for t in np.quantile(result.time[ended], [0, 0.25, 0.5, 0.75, 1], method="lower")]
             rows.append(_row(name, cells))
@@ -133,7 +141,7 @@ def _planes(result: Reported, varying: list[str]) -> list[Picture]:
 
 def _row(name: str, cells: list[str]) -> Row:
     """One outcome's row; a defender's belongs to that of interception."""
-    part = name.startswith("d")
+    part = is_defender(name)
     return Row(f"by {name}" if part else name, cells, part)
 
 
@@ -145,8 +153,9 @@ def examples(result: Reported) -> Section:
     """A few trials of each outcome, to be played again."""
     rows = []
     sc = result.scenario
-    events = indicators(result.kind, result.defender, sc.n)
-    for name, ended in zip(statistics.outcome_names(sc.n), events, strict=True):
+    lost = diverged_of(result)
+    events = indicators(result.kind, result.defender, sc.n, lost)
+    for name, ended in zip(statistics.outcome_names(sc.n, diverged=lost is not None), events, strict=True):
         first = np.flatnonzero(ended)[:_EXAMPLES]
         if name != "intercepted" and first.size:
             rows.append(_row(name, [", ".join(map(str, first))]))

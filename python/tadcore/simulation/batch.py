@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_index, as_positions
 from tadcore.game.compiled import as_scenario, game_of
-from tadcore.game.outcome import Outcome, OutcomeKind
+from tadcore.game.outcome import Outcome, kind_counts
 from tadcore.scenario.model import Scenario
 
 from .passes import Termination, as_termination
@@ -34,6 +34,9 @@ class Batch:
         The intercepting defender, 0-based; -1 where none intercepted.
     time : ndarray of float64, shape (M,)
         The instant of the end.
+    diverged : ndarray of bool, shape (M,)
+        Whether the game diverged before its end or at it (`tadcore.game.Divergence`): what follows is played by the
+        same rules, but ``kind`` and ``time`` say nothing of a pursuit then. Statistics count such games apart.
     passed : ndarray of bool, shape (M,), or None
         Whether a capture radius was entered between two instants, before the one that ended the game: with continuous
         termination the game would end there. None where that was not asked for.
@@ -42,11 +45,12 @@ class Batch:
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
     time: Floats
+    diverged: NDArray[np.bool_]
     passed: NDArray[np.bool_] | None = None
 
     def counts(self) -> dict[str, int]:
-        """How many games ended in each way."""
-        return {kind.name.lower(): int(np.count_nonzero(self.kind == kind)) for kind in OutcomeKind}
+        """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""
+        return kind_counts(self.kind, self.diverged)
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -58,8 +62,9 @@ class Batch:
     def __getitem__(self, index: int | slice) -> Outcome | Batch:
         if isinstance(index, slice):
             passed = None if self.passed is None else self.passed[index]
-            return Batch(self.kind[index], self.defender[index], self.time[index], passed)
-        return Outcome.of(int(self.kind[index]), int(self.defender[index]), float(self.time[index]))
+            return Batch(self.kind[index], self.defender[index], self.time[index], self.diverged[index], passed)
+        end = int(self.kind[index]), int(self.defender[index]), float(self.time[index])
+        return Outcome.of(*end, diverged=bool(self.diverged[index]))
 
     def __iter__(self) -> Iterator[Outcome]:
         return (self[i] for i in range(len(self)))
@@ -107,7 +112,7 @@ def simulate_batch(
     Returns
     -------
     Batch
-        ``kind``, ``defender``, ``time`` and, where asked for, ``passed``, each of length M.
+        ``kind``, ``defender``, ``time``, ``diverged`` and, where asked for, ``passed``, each of length M.
 
     Raises
     ------
@@ -133,7 +138,7 @@ def simulate_batch(
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
     continuous = as_termination(termination) == "continuous"
     game = game_of(sc)
-    kind, defender, time, passed = game.simulate_batch(
+    kind, defender, time, diverged, passed = game.simulate_batch(
         starts, sight, capture, continuous=continuous, passes=bool(passes), threads=workers
     )
-    return Batch(kind, defender, time, passed if passes else None)
+    return Batch(kind, defender, time, diverged, passed if passes else None)

@@ -54,8 +54,12 @@ class Written(Recorded, Variant, Protocol):
         """J of every player."""
 
     @property
+    def changes_after_divergence(self) -> int:
+        """Network changes after the game diverged."""
+
+    @property
     def converged(self) -> bool:
-        """Whether all gains reached the tolerance."""
+        """Whether all gains reached the tolerance, and the game did not diverge."""
 
     @property
     def unconverged(self) -> int:
@@ -117,6 +121,7 @@ def dataset_of(run: Written) -> xr.Dataset:
             "interaction": sc.interaction,
             "references": _PAPER,
             **variant_of(run),
+            **divergence_of(run),
             **provenance(sc),
             **record_of(run),
         },
@@ -135,6 +140,13 @@ def variant_of(run: Written) -> dict[str, Any]:
     }
 
 
+def divergence_of(run: Written) -> dict[str, Any]:
+    """What a reader of a file must know of a run that diverged; empty for one that did not."""
+    if run.diverged is None:
+        return {}
+    return {"diverged": str(run.diverged), "diverged_time": run.diverged.time, "diverged_size": run.diverged.size}
+
+
 def _about(name: str, symbol: str, source: str) -> dict[str, str]:
     attributes = {"long_name": name, "units": "1", "symbol": symbol, "reference": source}
     return {key: value for key, value in attributes.items() if value}
@@ -149,11 +161,13 @@ def summary_of(run: Written) -> dict[str, Any]:
             "time": run.outcome.time,
             "text": str(run.outcome),
         },
+        "diverged": run.diverged and {"time": run.diverged.time, "size": run.diverged.size, "text": str(run.diverged)},
         **variant_of(run),
         "passes": [dataclasses.asdict(each) for each in run.passes],
         "network_changes": [
             {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
         ],
+        "network_changes_after_divergence": run.changes_after_divergence,
         "costs": run.costs,
         "converged": run.converged,
         "unconverged_instants": run.unconverged,

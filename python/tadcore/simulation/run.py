@@ -18,6 +18,7 @@ from tadcore._shared.arrays import Floats, as_amount
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
+from tadcore.game.divergence import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
@@ -71,6 +72,10 @@ class Run:
         continuous termination.
     termination : {"sampled", "continuous"}
         When the game ends, see `simulate`.
+    diverged : Divergence or None
+        When the game diverged, and how far it went; None where it did not. It is played on, but its end, costs and
+        network then say nothing of a pursuit. Where it leaves the range of double precision, the record stops before
+        the end.
     certified : int
         Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
@@ -94,6 +99,7 @@ class Run:
     dwell: float = 0.0
     passes: tuple[Pass, ...] = ()
     termination: Termination = "sampled"
+    diverged: Divergence | None = None
 
     @property
     def variant(self) -> str:
@@ -104,8 +110,8 @@ class Run:
 
     @property
     def converged(self) -> bool:
-        """Whether the gains of every instant reached the tolerance."""
-        return self.unconverged == 0
+        """Whether the gains of every instant reached the tolerance, and the game did not diverge."""
+        return self.unconverged == 0 and self.diverged is None
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
@@ -118,10 +124,17 @@ class Run:
     def network_changes(self) -> tuple[NetworkChange, ...]:
         """(time, edges added, edges removed) wherever the network changes, the initial network first.
 
-        Empty for a game that is over at t = 0: termination is tested before the network is formed.
+        Empty for a game that is over at t = 0: termination is tested before the network is formed. Of a game that
+        diverges, ``changes_after_divergence`` counts the last ones.
         """
         in_force = len(self.times) - 1
         return changes_of(self.times[:in_force], self.adjacency[:in_force], self.scenario.players)
+
+    @property
+    def changes_after_divergence(self) -> int:
+        """How many of the network changes come after the game diverged: in the end they are of rounding noise."""
+        until = np.inf if self.diverged is None else self.diverged.time
+        return sum(change.time >= until for change in self.network_changes)
 
     def intervals(self) -> tuple[Interval, ...]:
         """(start, end, edges) of the stretches with one network, the last up to the end of the game."""
@@ -193,14 +206,22 @@ class Run:
         save(self, path)
 
     def __repr__(self) -> str:
-        changes = max(len(self.network_changes) - 1, 0)
+        later = self.changes_after_divergence
+        changes = max(len(self.network_changes) - 1, 0) - later
         network = {0: "fixed network", 1: "1 network change"}.get(changes, f"{changes} network changes")
-        warning = "" if self.converged else f", {self.unconverged} instants NOT converged"
+        if self.diverged is not None:
+            network += f" and {later} after it diverged"
+        warning = "" if not self.unconverged else f", {self.unconverged} instants NOT converged"
         edges = dict.fromkeys("→".join(c.edge) for c in self.chattering)
         chattering = f", chattering: {', '.join(edges)}" if edges else ""
         other = f"; a variant, {told(self)}" if self.variant else ""
         other += f"; {_passed(self.passes)}" if self.passes else ""
-        return f"Run({self.scenario.interaction}: {self.outcome}; {network}{chattering}{warning}{other})"
+        lost = (
+            ""
+            if self.diverged is None
+            else f"; DIVERGES at t = {self.diverged.time:.10g}, size {self.diverged.size:.2g}"
+        )
+        return f"Run({self.scenario.interaction}: {self.outcome}{lost}; {network}{chattering}{warning}{other})"
 
 
 def _passed(passes: tuple[Pass, ...]) -> str:
@@ -260,7 +281,7 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0, termi
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
         scenario=sc,
-        outcome=Outcome.of(record.kind, record.defender, record.time),
+        outcome=Outcome.of(record.kind, record.defender, record.time, diverged=record.diverged is not None),
         times=record.times,
         position=record.position,
         control=record.control,
@@ -275,4 +296,5 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0, termi
         **rule,
         passes=tuple(Pass(None if who < 0 else who, *rest) for who, *rest in record.passes),
         termination=ending,
+        diverged=None if record.diverged is None else Divergence(*record.diverged),
     )

@@ -46,6 +46,7 @@ from .outcomes import (
     as_counts,
     as_level,
     as_outcomes,
+    diverged_of,
     indicators,
     outcome_names,
 )
@@ -65,17 +66,19 @@ class Comparison:
     Attributes
     ----------
     names : tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
-    difference, low, high : ndarray, shape (3 + n,)
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``; last ``"diverged"``, where some
+        trials did in A or in B.
+    difference, low, high : ndarray, shape (3 + n,) or (4 + n,)
         P_A - P_B and the ends of its interval.
     only_a, only_b : ndarray of int, shape (3 + n,)
         Trials that end so in A but not in B, and the reverse.
     p_value : ndarray, shape (3 + n,)
         Of the exact McNemar test of no difference; with ``"sequence"`` of a test that holds whenever one stops.
-    transitions : ndarray of int, shape (3, 3)
-        Trials by their kind in A (row) and in B (column), in the order of `OutcomeKind`.
+    transitions : ndarray of int, shape (3, 3) or (4, 4)
+        Trials by their kind in A (row) and in B (column), in the order of `OutcomeKind`; last those that diverged,
+        where there are any.
     flipped : ndarray of int
-        The trials whose kind differs.
+        The trials whose kind differs, or that diverged in one of the two.
     redirected : ndarray of int
         The trials that are intercepted in both, by different defenders.
     trials : int
@@ -175,6 +178,8 @@ def compare(a: TrialOutcomes, b: TrialOutcomes, *, level: float | None = None) -
         b.kind,
         b.defender,
         a.scenario.n,
+        diverged_a=diverged_of(a),
+        diverged_b=diverged_of(b),
         level=level_of(next(iter(rules.values()), None), level),
         method="sequence" if rules else "score",
     )
@@ -188,6 +193,8 @@ def paired(
     defender_b: ArrayLike,
     n: int,
     *,
+    diverged_a: ArrayLike | None = None,
+    diverged_b: ArrayLike | None = None,
     level: float = 0.95,
     method: Method = "score",
 ) -> Comparison:
@@ -199,6 +206,8 @@ def paired(
         Outcomes under A and under B, as in `tadcore.Batch`.
     n : int
         Number of defenders.
+    diverged_a, diverged_b : array_like of bool, shape (M,), optional
+        Which trials diverged; these are counted apart.
     level : float
         Confidence level of each interval by itself.
     method : {"score", "sequence"}
@@ -216,20 +225,24 @@ def paired(
         The arrays do not fit together.
     """
     as_level(level)
-    code_a, who_a = as_outcomes(kind_a, defender_a, n)
-    code_b, who_b = as_outcomes(kind_b, defender_b, n)
+    lost = diverged_a is not None or diverged_b is not None
+    none_a, none_b = (np.zeros(np.size(kind), dtype=np.bool_) if lost else None for kind in (kind_a, kind_b))
+    events_a = indicators(kind_a, defender_a, n, none_a if diverged_a is None else diverged_a)
+    events_b = indicators(kind_b, defender_b, n, none_b if diverged_b is None else diverged_b)
+    code_a, who_a = as_outcomes(kind_a, defender_a, n, diverged_a)
+    code_b, who_b = as_outcomes(kind_b, defender_b, n, diverged_b)
     if code_a.shape != code_b.shape:
         raise ScenarioError("kind_b", f"{len(code_b)} trials", f"{len(code_a)} trials, as in A")
-    only_a, only_b = discordant(indicators(code_a, who_a, n), indicators(code_b, who_b, n))
+    only_a, only_b = discordant(events_a, events_b)
     trials = len(code_a)
     low, high = difference_interval(only_a, only_b, trials, level=level, method=method)
     test = _fair_coins if method == "sequence" else _mcnemar
     p_values = [test(int(x), int(y)) for x, y in zip(only_a, only_b, strict=True)]
-    transitions = np.zeros((len(KINDS), len(KINDS)), dtype=np.int64)
+    transitions = np.zeros((len(KINDS) + lost, len(KINDS) + lost), dtype=np.int64)
     np.add.at(transitions, (code_a, code_b), 1)
     both = (code_a == OutcomeKind.INTERCEPTED) & (code_b == OutcomeKind.INTERCEPTED)
     return Comparison(
-        names=outcome_names(n),
+        names=outcome_names(n, diverged=lost),
         difference=(only_a - only_b) / trials,
         low=low,
         high=high,

@@ -29,9 +29,8 @@ from tadcore import _core
 from tadcore._shared.arrays import Floats, as_amount, as_index, as_real, refuse_where
 from tadcore._shared.shares import decimals, percent, share
 from tadcore.errors import ScenarioError
-from tadcore.game.outcome import OutcomeKind
 
-from .outcomes import KINDS, TrialOutcomes, as_level, as_outcomes, outcome_names
+from .outcomes import KINDS, TrialOutcomes, as_level, diverged_of, excluding, indicators, outcome_names
 from .stopping import level_of, stopping_of
 
 if TYPE_CHECKING:
@@ -51,8 +50,9 @@ class Incidence:
     times : ndarray, shape (K + 1,)
         The grid t_k = k T / K.
     names : tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
-    estimate, low, high : ndarray, shape (3 + n, K + 1)
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``; last ``"diverged"``, where some
+        trials did: they end in no other outcome, and are counted at the instants of their ends.
+    estimate, low, high : ndarray, shape (3 + n, K + 1) or (4 + n, K + 1)
         F_j and its band, simultaneous over time.
     trials : int
         M.
@@ -80,7 +80,7 @@ class Incidence:
     @property
     def running(self) -> Floats:
         """Share of the trials that have not ended at or before each instant, shape (K + 1,)."""
-        return np.asarray(1.0 - self.estimate[: len(KINDS)].sum(axis=0))
+        return np.asarray(1.0 - self.estimate[excluding(self.names)].sum(axis=0))
 
     def __getitem__(self, name: str) -> Floats:
         """The curve of one outcome, shape (K + 1,)."""
@@ -114,6 +114,7 @@ def incidence(
     jointly: bool = False,
     looks: int = 0,
     between: bool = False,
+    diverged: ArrayLike | None = None,
 ) -> Incidence:
     """Estimate the cumulative incidence of each outcome.
 
@@ -137,6 +138,8 @@ def incidence(
     between : bool
         Whether games may end between instants, as with ``termination="continuous"``. A curve then counts at each
         instant what has ended by then.
+    diverged : array_like of bool, shape (M,), optional
+        Which trials diverged; these are counted apart, in a last row ``"diverged"`` where there are any.
 
     Returns
     -------
@@ -155,27 +158,25 @@ def incidence(
     >>> found["intercepted"].round(3)
     array([0.   , 0.   , 0.667, 0.667, 0.667])
     """
-    codes, who = as_outcomes(kind, defender, n)
+    events = indicators(kind, defender, n, diverged)
+    names = outcome_names(n, diverged=diverged is not None)
     confidence = as_level(level)
     times = _grid(as_amount("horizon", horizon), step, n)
     steps = len(times) - 1
-    at = _instants(time, len(codes), horizon, steps, between=between)
-    names = outcome_names(n)
-    ended = np.zeros((len(names), steps + 1), dtype=np.int64)
-    np.add.at(ended, (codes, at), 1)
-    intercepted = codes == OutcomeKind.INTERCEPTED
-    np.add.at(ended, (who[intercepted] + len(KINDS), at[intercepted]), 1)
-    estimate = ended.cumsum(axis=1) / len(codes)
+    at = _instants(time, events.shape[1], horizon, steps, between=between)
+    trials = len(at)
+    ended = np.array([np.bincount(at[event], minlength=steps + 1) for event in events])
+    estimate = ended.cumsum(axis=1) / trials
     asked = as_index("looks", looks, 2**32)
     error = (1.0 - confidence) / (len(names) if jointly else 1) / (asked * (asked + 1) if asked else 1)
-    half = _half_width(error, len(codes))
+    half = _half_width(error, trials)
     return Incidence(
         times=times,
         names=names,
         estimate=estimate,
         low=np.maximum(estimate - half, 0.0),
         high=np.minimum(estimate + half, 1.0),
-        trials=len(codes),
+        trials=trials,
         level=confidence,
         half_width=half,
         jointly=jointly,
@@ -216,6 +217,7 @@ def incidence_of(result: TrialOutcomes, *, level: float | None = None, jointly: 
         jointly=jointly,
         looks=0 if stopping is None else stopping.looks(result.trials),
         between=getattr(result, "termination", "sampled") == "continuous",
+        diverged=diverged_of(result),
     )
     return found if stopping is None else replace(found, rule=str(stopping))
 

@@ -27,7 +27,7 @@ from tadcore._shared.shares import estimate, percent
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
 
-from .outcomes import KINDS, MOST_TRIALS, TrialOutcomes, as_counts, as_level, outcome_counts, outcome_names
+from .outcomes import KINDS, MOST_TRIALS, TrialOutcomes, as_counts, as_level, diverged_of, outcome_counts
 from .sequences import mixture_interval
 from .stopping import level_of, stopping_of
 
@@ -45,10 +45,11 @@ class OutcomeProbabilities:
     Attributes
     ----------
     names : tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``: interception by that defender.
-    count : ndarray of int, shape (3 + n,)
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``: interception by that defender;
+        last ``"diverged"``, where some trials did.
+    count : ndarray of int, shape (3 + n,) or (4 + n,)
         Trials that ended so.
-    estimate, low, high : ndarray, shape (3 + n,)
+    estimate, low, high : ndarray, shape (3 + n,) or (4 + n,)
         The share of the trials, and the ends of its interval.
     trials : int
         M.
@@ -95,7 +96,14 @@ class OutcomeProbabilities:
 
 
 def probabilities(
-    kind: ArrayLike, defender: ArrayLike, n: int, *, level: float = 0.95, method: Method = "wilson", rule: str = ""
+    kind: ArrayLike,
+    defender: ArrayLike,
+    n: int,
+    *,
+    diverged: ArrayLike | None = None,
+    level: float = 0.95,
+    method: Method = "wilson",
+    rule: str = "",
 ) -> OutcomeProbabilities:
     """Estimate the probability of each outcome.
 
@@ -105,6 +113,8 @@ def probabilities(
         Outcomes of M independent trials, as in `tadcore.Batch`.
     n : int
         Number of defenders.
+    diverged : array_like of bool, shape (M,), optional
+        Which trials diverged; these are counted apart, in a last row ``"diverged"`` where there are any.
     level : float
         Confidence level.
     method : {"wilson", "exact", "sequence"}
@@ -135,12 +145,12 @@ def probabilities(
     d1               2    0.5000  [0.1500, 0.8500]
     d2               1    0.2500  [0.0456, 0.6994]
     """
-    counts = outcome_counts(kind, defender, n)
+    counts = outcome_counts(kind, defender, n, diverged)
     trials = np.size(np.asarray(kind))
     count = np.array(list(counts.values()), dtype=np.int64)
     error = (1.0 - as_level(level)) / (len(KINDS) if method == "sequence" else 1)
     low, high = ends(count, trials, error, method)
-    return OutcomeProbabilities(outcome_names(n), count, count / trials, low, high, trials, float(level), method, rule)
+    return OutcomeProbabilities(tuple(counts), count, count / trials, low, high, trials, float(level), method, rule)
 
 
 def probabilities_of(
@@ -178,6 +188,7 @@ def probabilities_of(
         result.kind,
         result.defender,
         result.scenario.n,
+        diverged=diverged_of(result),
         level=level_of(stopping, level),
         method=by_default if method is None else method,
         rule=even if stopping is None else str(stopping),

@@ -2,12 +2,13 @@
 
 An *outcome* here is an event that a trial ends in: ``"timeout"``, ``"captured"`` and ``"intercepted"``, which exclude
 one another and together are certain, then ``"d1"`` … ``"dn"``, interception by that defender, which together make up
-``"intercepted"``.
+``"intercepted"``. Where some trials diverged (`tadcore.game.Divergence`), a last outcome ``"diverged"`` has all of
+them, however they then ended, and no other outcome has any: the four are certain together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
 from tadcore.errors import ScenarioError
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.scenario.model import Scenario
 
 MOST_TRIALS = 2**40
@@ -23,6 +24,8 @@ MOST_TRIALS = 2**40
 
 KINDS = tuple(kind.name.lower() for kind in OutcomeKind)
 """Names of the three kinds, at the place of their codes."""
+
+_LOST = len(KINDS)  # stands for the kind of a trial that diverged
 
 
 class TrialOutcomes(Protocol):
@@ -61,24 +64,47 @@ class TrialOutcomes(Protocol):
         """The varied numbers."""
 
 
-def outcome_names(n: int) -> tuple[str, ...]:
+def outcome_names(n: int, *, diverged: bool = False) -> tuple[str, ...]:
     """The outcomes of a game, in the order of every table.
 
     Parameters
     ----------
     n : int
         Number of defenders.
+    diverged : bool
+        Whether some trials diverged.
 
     Returns
     -------
     tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``, and ``"diverged"`` where some did.
     """
-    return (*KINDS, *(f"d{i}" for i in range(1, n + 1)))
+    return (*KINDS, *(f"d{i}" for i in range(1, n + 1)), *([DIVERGED] if diverged else []))
 
 
-def as_outcomes(kind: ArrayLike, defender: ArrayLike, n: int) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
-    """Two arrays of one length, at least one, that agree on who intercepted; raises `ScenarioError`."""
+def is_defender(name: str) -> bool:
+    """Whether an outcome, or a player, is that of one defender."""
+    return name[:1] == "d" and name[1:].isdigit()
+
+
+def excluding(names: Sequence[str]) -> list[int]:
+    """The places of the outcomes that exclude one another and together are certain, defenders left out."""
+    return [i for i, name in enumerate(names) if name in (*KINDS, DIVERGED)]
+
+
+def diverged_of(result: Any) -> NDArray[np.bool_] | None:
+    """Which trials of a study diverged; None where none did, or where the result does not know of divergence."""
+    lost = getattr(result, "diverged", None)
+    return None if lost is None or not np.any(lost) else np.asarray(lost, dtype=np.bool_)
+
+
+def as_outcomes(
+    kind: ArrayLike, defender: ArrayLike, n: int, diverged: ArrayLike | None = None
+) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
+    """Two arrays of one length, at least one, that agree on who intercepted; raises `ScenarioError`.
+
+    A trial that diverged has the code 3 and no defender, however it ended.
+    """
     as_index("n", n, 2**16, least=1)
     codes, who = _integers("kind", kind), _integers("defender", defender)
     if codes.ndim != 1 or codes.shape != who.shape:
@@ -89,17 +115,25 @@ def as_outcomes(kind: ArrayLike, defender: ArrayLike, n: int) -> tuple[NDArray[n
     intercepted = codes == OutcomeKind.INTERCEPTED
     wrong = np.where(intercepted, (who < 0) | (who >= n), who != -1)
     refuse_where("defender", who, wrong, f"in [0, {n - 1}] where a defender intercepted, -1 elsewhere")
+    if diverged is not None:
+        lost = np.asarray(diverged)
+        if lost.dtype != np.bool_ or lost.shape != codes.shape:
+            raise ScenarioError("diverged", diverged, "a bool for each trial")
+        codes, who = np.where(lost, _LOST, codes), np.where(lost, -1, who)
     return codes.astype(np.int8), who.astype(np.int32)
 
 
-def indicators(kind: ArrayLike, defender: ArrayLike, n: int) -> NDArray[np.bool_]:
-    """Which trials ended in each outcome, shape (3 + n, M), rows as in `outcome_names`."""
-    codes, who = as_outcomes(kind, defender, n)
-    rows = [codes == kind for kind in OutcomeKind]
-    return np.array([*rows, *(who == i for i in range(n))])
+def indicators(kind: ArrayLike, defender: ArrayLike, n: int, diverged: ArrayLike | None = None) -> NDArray[np.bool_]:
+    """Which trials ended in each outcome, rows as in `outcome_names`, shape (3 + n, M).
+
+    Where ``diverged`` is given there is a last row for it, and the others are without the trials that diverged.
+    """
+    codes, who = as_outcomes(kind, defender, n, diverged)
+    rows = [*(codes == kind for kind in OutcomeKind), *(who == i for i in range(n))]
+    return np.array(rows if diverged is None else [*rows, codes == _LOST])
 
 
-def outcome_counts(kind: ArrayLike, defender: ArrayLike, n: int) -> dict[str, int]:
+def outcome_counts(kind: ArrayLike, defender: ArrayLike, n: int, diverged: ArrayLike | None = None) -> dict[str, int]:
     """How many trials ended in each outcome, by name.
 
     Parameters
@@ -108,20 +142,24 @@ def outcome_counts(kind: ArrayLike, defender: ArrayLike, n: int) -> dict[str, in
         As in `tadcore.Batch`.
     n : int
         Number of defenders.
+    diverged : array_like of bool, shape (M,), optional
+        Which trials diverged.
 
     Returns
     -------
     dict of str to int
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``, and ``"diverged"`` where some did.
 
     Raises
     ------
     ScenarioError
         The arrays do not fit together, or hold no trial.
     """
-    codes, who = as_outcomes(kind, defender, n)
-    counts = [*np.bincount(codes, minlength=len(KINDS)), *np.bincount(who[who >= 0], minlength=n)]
-    return dict(zip(outcome_names(n), map(int, counts), strict=True))
+    codes, who = as_outcomes(kind, defender, n, diverged)
+    kinds = np.bincount(codes, minlength=_LOST + 1)
+    lost = bool(kinds[_LOST])
+    counts = [*kinds[:_LOST], *np.bincount(who[who >= 0], minlength=n), *([kinds[_LOST]] if lost else [])]
+    return dict(zip(outcome_names(n, diverged=lost), map(int, counts), strict=True))
 
 
 def as_level(level: Any) -> float:

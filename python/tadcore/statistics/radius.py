@@ -31,7 +31,7 @@ class Breakpoints:
     radius : ndarray, shape (B,)
         The least radius at which the new outcome holds, to within ``tolerance`` from above.
     kind_before, kind_after : ndarray of int8, shape (B,)
-        Codes of `OutcomeKind` below and at ``radius``.
+        Codes of `OutcomeKind` below and at ``radius``, whether or not the game diverged.
     defender_before, defender_after : ndarray of int32, shape (B,)
         The intercepting defender, 0-based; -1 where none intercepts.
     tolerance : float
@@ -103,7 +103,8 @@ class RadiusCurve:
     radii : ndarray, shape (R,)
         Where it was evaluated.
     names : tuple of str
-        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``.
+        ``"timeout"``, ``"captured"``, ``"intercepted"``, then ``"d1"`` … ``"dn"``; last ``"diverged"``, where some
+        trials did at some radius: the shapes below then begin with 4 + n.
     estimate, low, high : ndarray, shape (3 + n, R)
         Probabilities with pointwise intervals: Wilson's, or a confidence sequence's where a rule was asked when to
         stop.
@@ -118,6 +119,8 @@ class RadiusCurve:
         The gain per unit of radius between neighbouring radii, paired, each interval by itself; 0 up to inf.
     kind, defender : ndarray of int8 and int32, shape (R, M)
         Every outcome, as in `tadcore.Batch`.
+    diverged : ndarray of bool, shape (R, M)
+        Which games diverged.
     level : float
         Confidence level.
     breakpoints : Breakpoints or None
@@ -144,6 +147,7 @@ class RadiusCurve:
     slope_high: Floats
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
+    diverged: NDArray[np.bool_]
     level: float
     breakpoints: Breakpoints | None
     rule: str = ""
@@ -224,7 +228,8 @@ class RadiusCurve:
         i = self.names.index("intercepted")
         ends = [int(np.argmin(self.estimate[i])), int(np.argmax(self.estimate[i]))]
         least, most = (" ".join(estimate(self.estimate[i, r], self.low[i, r], self.high[i, r])) for r in ends)
-        by = f"; {self.rule}" if self.rule else ""
+        lost = f"; {int(self.diverged.sum()):,} of {self.diverged.size:,} games diverged" if self.diverged.any() else ""
+        by = f"{lost}; {self.rule}" if self.rule else lost
         return (
             f"RadiusCurve({self.radius} of {self.player} at {len(self.radii)} radii in [{self.radii[0]:g}, "
             f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {least} to {most}, "

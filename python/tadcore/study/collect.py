@@ -28,7 +28,10 @@ class StoppingRule(Protocol):
     """When a study has seen enough, such as `tadcore.statistics.HalfWidth`."""
 
     def satisfied(self, counts: NDArray[np.int64], trials: int) -> bool:
-        """Whether the counts of the outcomes, by `OutcomeKind`, after so many trials are enough."""
+        """Whether the counts of the outcomes, by `OutcomeKind`, after so many trials are enough.
+
+        Trials that diverged are in no count; the counts then sum to less than ``trials``.
+        """
         ...
 
 
@@ -56,7 +59,7 @@ class Collection:
         self._tables: dict[int, pa.Table] = {}
         self._stopped: int | None = None
         self._looked = 0
-        self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
+        self._counts = np.zeros(len(OutcomeKind) + 1, dtype=np.int64)
 
     @property
     def stopping(self) -> Stopping | None:
@@ -100,7 +103,7 @@ class Collection:
                 self._counts += _counts(self._tables[self._looked])
                 self._looked += 1
                 trials = int(self._counts.sum())
-                if self._until.satisfied(self._counts.copy(), trials):
+                if self._until.satisfied(self._counts[: len(OutcomeKind)].copy(), trials):
                     self._stopped = trials
         self._bar.add(_counts(table), stored=stored)
 
@@ -111,7 +114,9 @@ class Collection:
 
 
 def _counts(table: pa.Table) -> NDArray[np.int64]:
-    return np.bincount(table["kind"].to_numpy(), minlength=len(OutcomeKind)).astype(np.int64)
+    """Trials by the kind of their end, then those that diverged, however they end."""
+    codes = np.where(table["diverged"].to_numpy(), len(OutcomeKind), table["kind"].to_numpy())
+    return np.bincount(codes, minlength=len(OutcomeKind) + 1).astype(np.int64)
 
 
 def jobs_of(trials: int) -> list[tuple[int, int]]:

@@ -31,6 +31,7 @@ class Outcomes(NamedTuple):
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
     time: Floats
+    diverged: NDArray[np.bool_]
     inputs: Floats
     """What was drawn, one column for each varied component."""
 
@@ -130,7 +131,7 @@ class Plan:
         positions, sight, capture = setups(self.scenario, self.quantities, inputs)
         radii = sight, capture
         batch = simulate_batch(self.scenario, positions, *radii, threads=threads, termination=self.termination)
-        return Outcomes(batch.kind, batch.defender, batch.time, inputs)
+        return Outcomes(batch.kind, batch.defender, batch.time, batch.diverged, inputs)
 
 
 def run_chunk(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.shares import share
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import DIVERGED, OutcomeKind
 
 _FORMAT = "{desc}|{bar}| {n_fmt}/{total_fmt} [{remaining}, {rate_fmt}{postfix}]"
 
@@ -27,7 +27,7 @@ class Progress:
     """
 
     def __init__(self, total: int, *, wanted: bool | str) -> None:
-        self._counts = np.zeros(len(OutcomeKind), dtype=np.int64)
+        self._counts = np.zeros(len(OutcomeKind) + 1, dtype=np.int64)
         self._bar: Any = None
         if wanted and _watched():
             from tqdm.auto import tqdm
@@ -36,7 +36,7 @@ class Progress:
             self._bar = tqdm(total=total, desc=label, unit="", unit_scale=True, dynamic_ncols=True, bar_format=_FORMAT)
 
     def add(self, counts: NDArray[np.int64], *, stored: bool = False) -> None:
-        """Count the outcomes of a chunk; those from a store do not enter the rate."""
+        """Count the outcomes of a chunk, by kind and last those that diverged; a store's do not enter the rate."""
         self._counts += counts
         if self._bar is None:
             return
@@ -47,9 +47,10 @@ class Progress:
         estimates = self._counts / max(int(self._counts.sum()), 1)
         order = (OutcomeKind.INTERCEPTED, OutcomeKind.CAPTURED, OutcomeKind.TIMEOUT)
         # "P(kind)" without its letters: the line has to fit into 80 columns, rate and all.
-        self._bar.set_postfix_str(
-            " ".join(f"{kind.name.lower()} {share(float(estimates[kind]), 3)}" for kind in order), refresh=stored
-        )
+        shown = [f"{kind.name.lower()} {share(float(estimates[kind]), 3)}" for kind in order]
+        if estimates[-1]:
+            shown.append(f"{DIVERGED} {share(float(estimates[-1]), 3)}")
+        self._bar.set_postfix_str(" ".join(shown), refresh=stored)
         if not stored:
             self._bar.update(rows)
 

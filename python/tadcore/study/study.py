@@ -316,9 +316,10 @@ class StudyResult(Trials):
     study : Study
         What was asked for.
     table : pyarrow.Table
-        One row for each trial: ``trial``, ``outcome`` (categorical: ``"timeout"``, ``"captured"``, ``"d1"``, …),
-        ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none intercepted), ``time``, and a column for
-        each varied component, such as ``attacker.position.x``. The metadata of the schema explains each.
+        One row for each trial: ``trial``, ``outcome`` (categorical: ``"timeout"``, ``"captured"``, ``"d1"``, …, or
+        ``"diverged"``), ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none intercepted), ``time``,
+        ``diverged`` (whether the game diverged, see `tadcore.game.Divergence`), and a column for each varied component,
+        such as ``attacker.position.x``. The metadata of the schema explains each.
     scenario : Scenario
         The scenario around which the inputs vary.
     seed : int

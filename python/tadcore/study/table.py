@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.sampling.design import CHUNK
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.passes import Termination
@@ -44,12 +44,15 @@ class Column:
 
 
 def outcome_names(n: int) -> list[str]:
-    """The categories of ``outcome``: the ends without an interception, then the defenders."""
-    return ["timeout", "captured", *(f"d{i + 1}" for i in range(n))]
+    """The categories of ``outcome``: the ends without an interception, the defenders, and games that diverged."""
+    return ["timeout", "captured", *(f"d{i + 1}" for i in range(n)), DIVERGED]
 
 
-def _outcome(kind: NDArray[Any], defender: NDArray[Any], sc: Scenario) -> pa.DictionaryArray:
+def _outcome(
+    kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[np.bool_], sc: Scenario
+) -> pa.DictionaryArray:
     code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+    code = np.where(diverged, OutcomeKind.INTERCEPTED + sc.n, code)
     return pa.DictionaryArray.from_arrays(code.astype(np.int32), pa.array(outcome_names(sc.n)))
 
 
@@ -59,8 +62,9 @@ FIXED = {
     ),
     "outcome": Column(
         pa.dictionary(pa.int32(), pa.string()),
-        "how the game ended: timeout, captured (the attacker reached the target), or the defender that intercepted",
-        lambda _, o, sc: _outcome(o.kind, o.defender, sc),
+        "how the game ended: timeout, captured (the attacker reached the target), the defender that intercepted, or "
+        "diverged, however it then ended",
+        lambda _, o, sc: _outcome(o.kind, o.defender, o.diverged, sc),
     ),
     "kind": Column(
         pa.int8(), "code of tadcore.OutcomeKind: 0 timeout, 1 captured, 2 intercepted", lambda _, o, __: o.kind
@@ -71,6 +75,12 @@ FIXED = {
         lambda _, o, __: o.defender,
     ),
     "time": Column(pa.float64(), "the instant of the end, as the horizon T", lambda _, o, __: o.time, _UNIT),
+    "diverged": Column(
+        pa.bool_(),
+        "whether the game diverged before its end or at it: somebody was more than 1000 times as far from the attacker "
+        "as any two players at the start; kind, defender and time then say nothing of a pursuit",
+        lambda _, o, __: o.diverged,
+    ),
 }
 _INPUTS = {
     "position": "where the player starts, one coordinate",
@@ -107,7 +117,7 @@ def table_of(chunk: int, outcomes: Outcomes, plan: Plan, schema: pa.Schema) -> p
 def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "sampled") -> str | None:
     """What no study could have written, in words; None where every row of a chunk can be how a game ended."""
     first = chunk * CHUNK
-    kind, defender, time = (table[name].to_numpy() for name in ("kind", "defender", "time"))
+    kind, defender, time, diverged = (table[name].to_numpy() for name in ("kind", "defender", "time", "diverged"))
     with np.errstate(invalid="ignore"):
         count = time / sc.horizon * sc.steps  # δ may differ from T / K in the last digits
         on_grid = np.abs(count - np.round(count)) <= max(1e-6, 1e-15 * sc.steps)
@@ -117,7 +127,8 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
     known = np.isin(kind, list(OutcomeKind))
     same = pc.equal(
-        pc.cast(table["outcome"], pa.string()), pc.cast(_outcome(kind * known, one * defender, sc), pa.string())
+        pc.cast(table["outcome"], pa.string()),
+        pc.cast(_outcome(kind * known, one * defender, diverged, sc), pa.string()),
     )
     when = "a time" if termination == "continuous" else "an instant of the grid"
     rules = {
@@ -125,7 +136,7 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "
         "kind": (known, "a code of tadcore.OutcomeKind"),
         "defender": (one, "a defender where one intercepted, and -1 elsewhere"),
         "time": (on_grid & within & last, f"{when} up to T = {sc.horizon:g}, for a timeout T itself"),
-        "outcome": (same.to_numpy(), "what kind and defender say"),
+        "outcome": (same.to_numpy(), "what kind, defender and diverged say"),
     }
     for name, (holds, rule) in rules.items():
         if not holds.all():

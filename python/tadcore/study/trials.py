@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import kind_counts
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath
 from tadcore.simulation.passes import Termination
@@ -56,6 +56,11 @@ class Trials:
         return self._column("time")
 
     @cached_property
+    def diverged(self) -> NDArray[np.bool_]:
+        """Whether the game diverged before its end or at it, shape (trials,); see `tadcore.game.Divergence`."""
+        return self._column("diverged")
+
+    @cached_property
     def inputs(self) -> dict[str, Floats]:
         """What was drawn: an array of shape (trials,) for each varied component, by the name of its column.
 
@@ -64,9 +69,8 @@ class Trials:
         return ByPath({name: self._column(name) for name in self.table.column_names if name not in FIXED})
 
     def counts(self) -> dict[str, int]:
-        """How many games ended in each way."""
-        many = np.bincount(self.kind, minlength=len(OutcomeKind))
-        return {kind.name.lower(): int(many[kind]) for kind in OutcomeKind}
+        """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""
+        return kind_counts(self.kind, self.diverged)
 
     def probabilities(
         self, *, level: float | None = None, method: Literal["wilson", "exact", "sequence"] | None = None
@@ -132,7 +136,7 @@ class Trials:
         return frame
 
     def _column(self, name: str) -> NDArray[Any]:
-        array: NDArray[Any] = self.table[name].combine_chunks().to_numpy()
+        array: NDArray[Any] = self.table[name].to_numpy()
         return array
 
     def __len__(self) -> int:

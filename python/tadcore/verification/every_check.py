@@ -97,6 +97,9 @@ def verify(
     except TadcoreError as error:
         return combine(f"{sc.interaction}: not played", [_undecided("play", error)])
     title = f"{sc.interaction}: {run.outcome}"
+    if run.diverged is not None and run.times[-1] < run.outcome.time:
+        why = f"the game {run.diverged}: it leaves the range of double precision after t = {run.times[-1]:g}"
+        return combine(title, [_undecided("play", TadcoreError(why))])
 
     def family(name: str, check: Callable[[], VerificationReport]) -> VerificationReport:
         """The checks of one module, or one undecided check where they cannot be computed."""

@@ -209,7 +209,7 @@ impl Game {
         })
     }
 
-    /// Outcomes of many runs: kind, defender, time, and whether it passed within a radius.
+    /// Outcomes of many runs: kind, defender, time, whether the game diverged, and whether it passed within a radius.
     #[pyo3(signature = (positions, visibility_radii, capture_radii, *, continuous=false, passes=false, threads=None))]
     // A keyword for each rule.
     #[allow(clippy::type_complexity, clippy::too_many_arguments)]
@@ -226,6 +226,7 @@ impl Game {
         Bound<'py, PyArray1<i8>>,
         Bound<'py, PyArray1<i32>>,
         Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<bool>>,
         Bound<'py, PyArray1<bool>>,
     )> {
         guarded(|| {
@@ -244,6 +245,7 @@ impl Game {
                 entries(py, ends.len(), |i| ends[i].outcome.code())?,
                 entries(py, ends.len(), |i| ends[i].outcome.defender())?,
                 entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
+                entries(py, ends.len(), |i| ends[i].diverged)?,
                 entries(py, ends.len(), |i| ends[i].passed)?,
             ))
         })

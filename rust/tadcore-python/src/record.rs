@@ -67,6 +67,12 @@ impl Record {
         self.record.passes.iter().map(told).collect()
     }
 
+    /// When the game diverged, and its largest size over that of its start; `None` where it did not.
+    #[getter]
+    fn diverged(&self) -> Option<(f64, f64)> {
+        self.record.diverged.map(|found| (self.policy.game().grid().time(found.step), found.size))
+    }
+
     /// Times of the rows.
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {

@@ -135,12 +135,9 @@ pub enum RunError {
     Equilibrium(#[from] EquilibriumError),
     /// A state left the range of double precision.
     #[error(
-        "{}the game leaves the range of double precision by t = {time}: its feedback drives a player beyond all bounds",
-        trial.map_or_else(String::new, |i| format!("trial {i}: "))
+        "the game leaves the range of double precision by t = {time}: its feedback drives a player beyond all bounds"
     )]
     Range {
-        /// Which game of a batch.
-        trial: Option<usize>,
         /// The instant at which it was noticed.
         time: f64,
     },

@@ -52,7 +52,8 @@ def test_a_cell_without_equilibrium_is_a_result():
     assert data["trials"].values.tolist() == [100, 100, 0, 0]
     assert np.isnan([data[name].values[2:] for name in ("probability", "low", "high")]).all()
     assert swept.cells[2].result is None
-    assert repr(swept) == "SweepResult(horizon (4); 2 without equilibrium)"
+    lost = [int(cell.result.diverged.sum()) for cell in swept.cells if cell.result]
+    assert repr(swept) == f"SweepResult(horizon (4); 2 without equilibrium; {sum(lost)} games diverged)"
 
 
 def test_wildcards_radii_and_vectors_can_be_swept():

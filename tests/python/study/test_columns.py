@@ -17,7 +17,7 @@ import tadcore
 from study_cases import CHUNK, calm, parts, study
 from tadcore import OutcomeKind, StoreError
 
-NAMES = ["timeout", "captured", "d1", "d2", "d3"]
+NAMES = ["timeout", "captured", "d1", "d2", "d3", "diverged"]
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,10 @@ def copied(clean, tmp_path):
 
 def words(result):
     """How every game ended, from its codes, one by one."""
+    ends = zip(result.kind, result.defender, result.diverged, strict=True)
     return [
-        f"d{d + 1}" if kind == OutcomeKind.INTERCEPTED else OutcomeKind(kind).name.lower()
-        for kind, d in zip(result.kind, result.defender, strict=True)
+        "diverged" if lost else f"d{d + 1}" if kind == OutcomeKind.INTERCEPTED else OutcomeKind(kind).name.lower()
+        for kind, d, lost in ends
     ]
 
 
@@ -130,7 +131,7 @@ def written_anew(path, change):
     digest = hashlib.sha256()
     for name, array in zip(table.column_names, arrays, strict=True):
         if name != "outcome":
-            digest.update(array.to_numpy().tobytes())
+            digest.update(array.to_numpy(zero_copy_only=False).tobytes())
     metadata = {**table.schema.metadata, b"tadcore_sha256": digest.hexdigest().encode()}
     pq.write_table(pa.Table.from_arrays(arrays, schema=table.schema.with_metadata(metadata)), path)
 
@@ -166,6 +167,7 @@ FORGED = {
     "between": (put_outcome(1, -1, 0.07), "time 0.07"),
     "early": (put_outcome(0, -1, 0.5), "time 0.5"),
     "trial": (put("trial", 40), "trial 40"),
+    "diverged": (put("diverged", True), "outcome '"),
     "word": (put("outcome", "d9"), "outcome 'd9'"),
     "nan input": (put("attacker.position.x", math.nan), "attacker.position.x, trial .*: got nan"),
     "far input": (put("attacker.position.y", 1e101), r"attacker.position.y, trial .*: got 1e\+101"),

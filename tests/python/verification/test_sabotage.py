@@ -14,6 +14,7 @@ import pytest
 
 import tadcore
 from tadcore import verification as v
+from tadcore.game import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.verification.checks.claims import RECORD
 
@@ -332,6 +333,8 @@ def test_nothing_that_a_run_carries_is_left_unchecked(run, field):
         other = (*found, "d1 passes at t = 0")
     elif field == "adjacency":
         other = ~found
+    elif field == "diverged":
+        other = Divergence(float(run.times[-1]), 2e3)
     elif field == "costs":
         other = {name: 2.0 * cost for name, cost in found.items()}
     else:
@@ -395,3 +398,23 @@ def test_the_table_in_the_documentation_is_that_of_the_claims():
     page = (Path(__file__).parents[3] / "docs" / "verification.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(record\.\w+)` \| (\S+) \| (.*) \|$", page, flags=re.MULTILINE)
     assert rows == [(name, f"{claim.bound:g}", claim.remedy) for name, claim in RECORD.items()]
+
+
+# ---- a divergence that is hidden, invented, or told otherwise
+
+
+def test_a_divergence_is_recomputed(run):
+    refused(run, "record.divergence", diverged=Divergence(float(run.times[-1]), 2e3))
+    lost = tadcore.simulate(tadcore.scenarios.load("paper-i2").replace({"attacker.control_weight": 0.38}))
+    equilibrium = tadcore.solve_equilibrium(lost.scenario)
+    assert v.check_record(lost, equilibrium)["record.divergence"].status == "passed"
+    k = int(np.searchsorted(lost.times, lost.diverged.time))
+    size = lost.diverged.size
+    for other in (
+        None,
+        Divergence(float(lost.times[k - 1]), size),
+        Divergence(float(lost.times[k + 1]), size),
+        Divergence(lost.diverged.time, size * (1 + 1e-6)),
+        Divergence(lost.diverged.time + 1e-4, size),
+    ):
+        refused(lost, "record.divergence", diverged=other)

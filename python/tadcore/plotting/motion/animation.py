@@ -20,6 +20,7 @@ from tadcore._shared.files import as_path, written
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 
 from .film import Film
 from .frames import Frame, frames_of, gif_delays
@@ -41,7 +42,7 @@ class Animation:
     Attributes
     ----------
     run : Run
-        What is shown.
+        What is shown; of a game that diverges, the part before.
     frames : list
         The pictures, in order.
     fps : float
@@ -49,9 +50,9 @@ class Animation:
     """
 
     def __init__(self, run: Recorded, *, seconds: float = 8.0, fps: float = 20.0, width: float = 7.2) -> None:
-        self.run = run
+        self.run = until_divergence(run)
         self.fps = _between("fps", fps, 0.1, 240.0)
-        self.frames = frames_of(run, _between("seconds", seconds, 0.01, 3600.0), self.fps)
+        self.frames = frames_of(self.run, _between("seconds", seconds, 0.01, 3600.0), self.fps)
         self._width = _between("width", width, 1.0, 40.0)
 
     @property
@@ -109,7 +110,7 @@ class Animation:
         """Return an ``<img>`` element with the animation as a GIF inside."""
         with tempfile.TemporaryDirectory() as folder:
             data = self.save(Path(folder) / "run.gif", dpi=dpi, progress=False).read_bytes()
-        alt = str(self.run.outcome)
+        alt = str(self.run.diverged or self.run.outcome)
         return f'<img alt="{alt}" src="data:image/gif;base64,{base64.b64encode(data).decode()}">'
 
     def _repr_html_(self) -> str:
@@ -192,7 +193,7 @@ class Animation:
         return palette
 
     def __repr__(self) -> str:
-        return f"Animation({self.run.outcome}; {len(self.frames)} frames, {self.duration:.3g} s)"
+        return f"Animation({self.run.diverged or self.run.outcome}; {len(self.frames)} frames, {self.duration:.3g} s)"
 
 
 def _split(colours: NDArray[np.int64]) -> NDArray[np.uint8]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
-from tadcore.plotting.tools.style import COLUMN, look, outcome_text
+from tadcore.plotting.tools.style import COLUMN, look, outcome_text, time_label
 
 from .paths import LAID_UNDER, name_runs
 from .series import known_axis, span, to_attacker
@@ -58,6 +59,7 @@ def compare(
             f"the runs have different players: {', '.join(run_a.scenario.players)} and "
             f"{', '.join(run_b.scenario.players)}"
         )
+    run_a, run_b = until_divergence(run_a), until_divergence(run_b)
     names = names or _names(run_a, run_b)
     if _full(run_a) and not _full(run_b):
         run_a, run_b, names = run_b, run_a, names[::-1]
@@ -86,7 +88,7 @@ def compare(
             ax.plot(run.times[-1:], values[-1:], marker=it.marker, markersize=3.4, clip_on=False, **common)
             if run is last:
                 ends.append((float(values[-1]), it.symbol, it.colour))
-    ax.set(xlabel="time $t$", xlim=span(last.times))
+    ax.set(xlabel=time_label(run_a, run_b), xlim=span(last.times))
     ax.set_ylabel(f"control along ${axis}$" if what == "controls" else "distance to $a$")
     if what == "distances":
         ax.set_ylim(bottom=0.0)

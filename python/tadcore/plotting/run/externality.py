@@ -8,6 +8,7 @@ import numpy as np
 
 from tadcore.game.externality import control_jumps
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.style import PAGE, edge_text, look
 
@@ -39,6 +40,7 @@ def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
         The axes drawn in.
     """
     as_run(run)
+    run = until_divergence(run)
     found = control_jumps(run)
     ax = new_axes(ax, PAGE, 2.6)
     count = found.sizes["time"]

@@ -10,8 +10,9 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_run, new_panels
-from tadcore.plotting.tools.style import look, symbol
+from tadcore.plotting.tools.style import look, symbol, time_label
 
 from .series import MAX_VERTICALS, mark_changes, span
 
@@ -45,6 +46,7 @@ def gains(
         ``axes`` as given, or the array of the new ones.
     """
     as_run(run)
+    run = until_divergence(run)
     observers = run.scenario.constrained
     if axes is None:
         axes = new_panels(len(observers), columns, page_from=2, row=1.15, rest=0.6, sharex=True)
@@ -66,7 +68,7 @@ def gains(
     for ax in drawn:
         below = ax.get_subplotspec()
         if below is None or below.is_last_row() or not ax.get_shared_x_axes().joined(ax, drawn[-1]) or ax is drawn[-1]:
-            ax.set_xlabel("time $t$")
+            ax.set_xlabel(time_label(run))
     _legend(drawn[0], entries)
     return axes
 

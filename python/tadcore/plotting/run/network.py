@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats, as_index
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_panels
-from tadcore.plotting.tools.style import look, note
+from tadcore.plotting.tools.style import look, note, outcome_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,6 +55,7 @@ def network(
         ``axes`` as given, or the array of the new ones.
     """
     as_run(run)
+    run = until_divergence(run)
     changes = run.network_changes
     if axes is None:
         count = max(min(len(changes), as_index("max_panels", max_panels, 1000, least=1)), 1)
@@ -75,8 +77,11 @@ def network(
         panel.set_axis_off()
     if not changes:
         panels[0].text(0.5, 0.5, "over at $t=0$", transform=panels[0].transAxes, ha="center", va="center")
-    if shown and shown < len(changes):
-        note(panels[shown - 1], f"and {len(changes) - shown} more")
+    remarks = [f"and {len(changes) - shown} more"] if shown and shown < len(changes) else []
+    if run.diverged is not None:
+        remarks.append(outcome_text(run))
+    if remarks and panels:
+        note(panels[max(shown, 1) - 1], ", ".join(remarks))
     return axes
 
 

@@ -9,8 +9,9 @@ from matplotlib.collections import LineCollection
 
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes, root_figure
-from tadcore.plotting.tools.style import COLUMN, edge_text, look, note
+from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, time_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,6 +45,7 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
         The axes drawn in.
     """
     as_run(run)
+    run = until_divergence(run)
     rows = _rows(run)
     ax = new_axes(ax, COLUMN, max(0.75 + _ROW * max(len(rows), 3) / 72.0, 1.3))
     spans = bars_of(run)
@@ -56,7 +58,7 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
         if rows[row][0] != rows[row - 1][0]:
             ax.axhline(row - 0.5, color="0.4", linewidth=0.5, zorder=1.1)
     end = float(run.outcome.time) or 1.0
-    ax.set(xlabel="time $t$", xlim=(0.0, end), ylim=(max(len(rows), 1) - 0.4, -0.6))
+    ax.set(xlabel=time_label(run), xlim=(0.0, end), ylim=(max(len(rows), 1) - 0.4, -0.6))
     _name(ax, rows)
     ax.tick_params(axis="y", length=0)
     times = [change.time for change in run.network_changes[1:]]

@@ -12,9 +12,10 @@ from tadcore._shared.arrays import Floats
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
-from tadcore.plotting.tools.style import COLUMN, look, note
+from tadcore.plotting.tools.style import COLUMN, look, note, time_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,6 +65,7 @@ def controls(
         The game has no such player or no such axis.
     """
     as_run(run)
+    run = until_divergence(run)
     given = [players] if isinstance(players, str) else run.scenario.constrained if players is None else players
     shown = _known(run, given)
     known_axis(run, axis)
@@ -98,6 +100,7 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
         The axes drawn in.
     """
     as_run(run)
+    run = until_divergence(run)
     ax = new_axes(ax, COLUMN, 2.5)
     names = run.scenario.players[:-1]
     curves = dict(zip(names, to_attacker(run), strict=True))
@@ -145,13 +148,14 @@ def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axe
         The axes drawn in.
     """
     as_run(run)
+    run = until_divergence(run)
     ax = new_axes(ax, COLUMN, 2.3)
     times = run.times
     # exactly zero where everyone sees everyone, whatever rounding leaves there
     everyone = np.asarray(run.adjacency.all(axis=(1, 2)))
     total, terms = np.where(everyone, 0.0, run.theta), np.where(everyone[:, None], 0.0, run.theta_terms)
     scale = float(max(total.max(), terms.max()))
-    ax.set(xlabel="time $t$", ylabel=r"$\Theta$ and its terms", xlim=span(times))
+    ax.set(xlabel=time_label(run), ylabel=r"$\Theta$ and its terms", xlim=span(times))
     if scale <= 0:
         ax.plot(times, total, color="black")
         ax.set_ylim(-1, 1)
@@ -228,7 +232,7 @@ def _curves(ax: Axes, run: Recorded, curves: dict[str, Floats], rims: Sequence[t
             zorder=2.5,
         )
         ends.append((float(values[-1]), it.symbol, it.colour))
-    ax.set(xlabel="time $t$", xlim=span(times))
+    ax.set(xlabel=time_label(run), xlim=span(times))
     ax.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
     label_ends(ax, [*ends, *rims])
 

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
 from tadcore.game.recorded import Recorded
+from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
@@ -77,6 +78,7 @@ def trajectories(
         The axes drawn in.
     """
     as_run(run)
+    run, full = until_divergence(run), None if full is None else until_divergence(full)
     dim = int(run.scenario.dim)
     shown = [run] if full is None else [run, full]
     points = np.concatenate([r.position.reshape(-1, dim) for r in shown])
@@ -111,6 +113,9 @@ def trajectories(
         name_runs(ax, names)
     elif title:
         ax.set_title(outcome_text(run))
+    lost = [r for r in shown if r.diverged is not None]
+    if lost and (full is not None or not title):
+        note(ax, outcome_text(lost[0]))
     return ax
 
 

@@ -148,7 +148,7 @@ def radius_curve(
     curve: RadiusCurve,
     ax: Axes | None = None,
     *,
-    outcomes: Sequence[str] = ("intercepted", "captured", "timeout"),
+    outcomes: Sequence[str] | None = None,
     quantity: str = "probability",
 ) -> Axes:
     """Draw outcome probabilities, differences or slopes against a radius.
@@ -161,8 +161,8 @@ def radius_curve(
         What to draw.
     ax : Axes, optional
         Where to draw; new axes of a one-column figure if not given.
-    outcomes : sequence of str
-        Which outcomes.
+    outcomes : sequence of str, optional
+        Which outcomes; by default intercepted, captured, timeout and, where some games did, diverged.
     quantity : {"probability", "difference", "slope"}
         What to draw of them.
 
@@ -177,6 +177,8 @@ def radius_curve(
         No such quantity or outcome, or no finite radius to draw it at.
     """
     kinds = {"probability": "estimate", "difference": "difference", "slope": "slope"}
+    if outcomes is None:
+        outcomes = ["intercepted", "captured", "timeout", *(name for name in curve.names if name == "diverged")]
     if quantity not in kinds:
         raise ValueError(f"no quantity {quantity!r}; one of {', '.join(kinds)}")
     finite = np.isfinite(curve.radii)

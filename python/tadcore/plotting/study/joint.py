@@ -12,7 +12,7 @@ from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.outcomes import input_label, outcome_look
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.statistics import TrialOutcomes, outcome_names
-from tadcore.statistics.outcomes import indicators
+from tadcore.statistics.outcomes import diverged_of, indicators
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,8 @@ def outcomes_over(
     ValueError
         The study does not vary such an input, it has no two finite values, or there is no such outcome.
     """
-    names = outcome_names(result.scenario.n)
+    lost = diverged_of(result)
+    names = outcome_names(result.scenario.n, diverged=lost is not None)
     if outcome not in names:
         raise ValueError(f"no outcome {outcome!r}; one of {', '.join(names)}")
     for name in (x, y):
@@ -75,7 +76,7 @@ def outcomes_over(
         if not values.size or values.min() == values.max():
             raise ValueError(f"input {name!r} has no two finite values to compare")
     many = cells or int(np.clip(np.sqrt(points.shape[1] / _FILLED), 2, _MOST_CELLS))
-    ended = indicators(result.kind, result.defender, result.scenario.n)[names.index(outcome), finite]
+    ended = indicators(result.kind, result.defender, result.scenario.n, lost)[names.index(outcome), finite]
     share, edges_x, edges_y = _shares(points, ended, many, max(least, 1))
     ax = new_axes(ax, COLUMN, 2.6)
     ax.set_facecolor("0.93")

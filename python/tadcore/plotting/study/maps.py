@@ -106,8 +106,10 @@ def edges(points: Floats, others: Floats) -> tuple[float, float]:
 def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
     """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
+    names = [*_KINDS, *found.scenario.players[: found.scenario.n], "diverged"]
     code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
-    names = [*_KINDS, *found.scenario.players[: found.scenario.n]]
+    if "diverged" in found.dataset:
+        code = np.where(found.dataset["diverged"].values, len(names) - 1, code)
     looks = [outcome_look(name) for name in names]
     colours = np.array([look.fill for look in looks])
     left, right, bottom, top = extent

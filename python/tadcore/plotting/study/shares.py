@@ -13,7 +13,7 @@ from tadcore.plotting.tools.axes import above, new_axes, new_panels
 from tadcore.plotting.tools.outcomes import boxes, input_label, parts_of, stack
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.statistics import TrialOutcomes, outcome_names
-from tadcore.statistics.outcomes import indicators
+from tadcore.statistics.outcomes import diverged_of, indicators
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,10 +56,11 @@ def outcomes_by_input(
         raise ValueError(f"input {name!r} has no two finite values to compare")
     where = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     filled = np.bincount(where, minlength=len(edges) - 1)
+    lost = diverged_of(result)
     ended = dict(
         zip(
-            outcome_names(result.scenario.n),
-            indicators(result.kind, result.defender, result.scenario.n)[:, finite],
+            outcome_names(result.scenario.n, diverged=lost is not None),
+            indicators(result.kind, result.defender, result.scenario.n, lost)[:, finite],
             strict=True,
         )
     )
@@ -112,7 +113,8 @@ def outcomes_by_inputs(
             ax.set_ylabel("share of trials" if ax.get_subplotspec().is_first_col() else "")
         else:
             ax.set_axis_off()
-    shown = boxes(parts_of(outcome_names(result.scenario.n)))
+    lost = diverged_of(result) is not None
+    shown = boxes(parts_of(outcome_names(result.scenario.n, diverged=lost)))
     axes.flat[0].figure.legend(handles=shown, loc="outside upper center", ncols=min(len(shown), 8), frameon=False)
     return axes
 

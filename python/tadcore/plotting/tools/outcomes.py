@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 
 from tadcore._shared.arrays import Floats
 from tadcore.scenario.paths import short
+from tadcore.statistics.outcomes import is_defender
 
 from .style import look, symbol
 
@@ -40,7 +41,9 @@ class OutcomeLook:
 
 
 def outcome_look(name: str) -> OutcomeLook:
-    """Return how the outcome ``name`` ("timeout", "captured", "intercepted", "d1", …) is drawn."""
+    """Return how the outcome ``name`` ("timeout", "captured", "intercepted", "diverged", "d1", …) is drawn."""
+    if name == "diverged":
+        return OutcomeLook("diverged", "#6A3D9A", (0.36, 0.33, 0.4), "++", "x", (0, (5, 1, 1, 1, 1, 1)))
     if name == "timeout":
         return OutcomeLook("timeout", "#666666", (0.97, 0.97, 0.97), "", "v", (0, (1, 2.5)))
     if name == "captured":
@@ -55,7 +58,8 @@ def outcome_look(name: str) -> OutcomeLook:
 
 def parts_of(names: Sequence[str]) -> list[str]:
     """The outcomes that exclude one another and are certain together: "intercepted" by its defenders."""
-    return [*(name for name in names if name.startswith("d")), "captured", "timeout"]
+    lost = [name for name in names if name == "diverged"]
+    return [*(name for name in names if is_defender(name)), "captured", "timeout", *lost]
 
 
 def boxes(names: Sequence[str]) -> list[Patch]:
@@ -73,7 +77,7 @@ def stack(ax: Axes, x: Floats, base: Floats, top: Floats, name: str) -> None:
 
 def quantity_label(name: str) -> str:
     """An output of a sensitivity analysis in words."""
-    if name in ("timeout", "captured", "intercepted") or _is_defender(name):
+    if name in ("timeout", "captured", "intercepted", "diverged") or is_defender(name):
         return f"“{outcome_look(name).label}”"
     return "the termination time" if name == "time" else name
 
@@ -81,17 +85,13 @@ def quantity_label(name: str) -> str:
 def input_label(name: str) -> str:
     """``defenders.0.position.x`` and its like as symbols, anything else as it is."""
     owner, _, rest = short(name).partition(".")
-    if owner not in ("attacker", "target") and not _is_defender(owner):
+    if owner not in ("attacker", "target") and not is_defender(owner):
         return name
     radius = {"visibility_radius": r"\zeta", "capture_radius": r"\sigma"}.get(rest)
     axis = rest.removeprefix("position.")
     if radius:
         return f"${radius}_{{{symbol(owner)}}}$"
     return f"${axis}_{{{symbol(owner)}}}(0)$" if axis in ("x", "y", "z") else name
-
-
-def _is_defender(label: str) -> bool:
-    return label[:1] == "d" and label[1:].isdigit()
 
 
 def _tint(colour: str, white: float) -> tuple[float, float, float]:

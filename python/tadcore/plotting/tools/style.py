@@ -104,6 +104,8 @@ def edge_text(observer: str, seen: Sequence[str], *, lost: bool = False) -> str:
 
 def outcome_text(run: Recorded) -> str:
     """Return the outcome in a line of mathtext, for a title."""
+    if run.diverged is not None:
+        return f"diverges at $t={run.diverged.time:.6g}$"
     at = f"$t={run.outcome.time:.6g}$"
     if run.outcome.kind == "intercepted":
         return f"$d_{{{int(run.outcome.defender or 0) + 1}}}$ intercepts $a$ at {at}"
@@ -125,6 +127,12 @@ def style() -> Iterator[None]:
         finally:
             # a notebook's backend switches this on when the first figure loads it, which may be in the block
             last.callback(mpl.interactive, mpl.is_interactive())
+
+
+def time_label(*runs: Recorded) -> str:
+    """The label of an axis of time, which says up to where a game that diverges is drawn."""
+    lost = [run.diverged.time for run in runs if run.diverged is not None]
+    return f"time $t$, up to the divergence at {max(lost):.6g}" if lost else "time $t$"
 
 
 def note(ax: Axes, text: str) -> None:

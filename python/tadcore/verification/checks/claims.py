@@ -23,6 +23,7 @@ _ALL = (
         "the end is not that of the distances and capture radii: another radius, winner or instant was used",
         "sec:problem_formulation",
     ),
+    Claim("record.divergence", 1e-9, "the distances diverge at another instant, or by another size, or not at all", ""),
     Claim("record.network", 1e-13, "the network is not that of the distances and visibility radii", "eq:limob"),
     Claim(
         "record.admissible",
@@ -69,6 +70,14 @@ RECORD = {claim.name: claim for claim in _ALL}
 """The claims by name, in the order in which they are checked."""
 
 BY_POSITIONS_ALONE = frozenset(
-    {"record.arrays", "record.start", "record.times", "record.network", "record.admissible", "record.outcome"}
+    {
+        "record.arrays",
+        "record.start",
+        "record.times",
+        "record.network",
+        "record.admissible",
+        "record.outcome",
+        "record.divergence",
+    }
 )
 """The checks that do not read P(t)."""

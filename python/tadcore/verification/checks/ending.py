@@ -1,4 +1,4 @@
-"""Where and when a record begins, and how it ends, from the scenario alone.
+"""Where and when a record begins, how it ends and whether it diverges, from the scenario alone.
 
 The rule of the end: at every instant, first the nearest defender within its own capture radius intercepts; else the
 attacker captures a target within σ_a; else, at t = T, time runs out.
@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.divergence import SIZE
 from tadcore.simulation.run import Run
 from tadcore.verification.report import Check
 
@@ -56,6 +57,25 @@ def check_outcome(run: Run) -> Check:
     """By how much the end contradicts distances and capture radii, relative to both; 1 where no distance could."""
     worst, why = max(_contradictions(run), key=lambda found: found[0])
     return RECORD["record.outcome"].judge(worst, why if worst > 0.0 else f"{run.outcome}")
+
+
+def check_divergence(run: Run) -> Check:
+    """By how much the distances contradict the recorded instant and size of the divergence, relative to both."""
+    at = run.position
+    scale = max(float(distances(at[0][:, np.newaxis], at[0][np.newaxis]).max()), TINY)
+    size = distances(at[:, :-1], at[:, -1:]).max(axis=1) / scale
+    claim = RECORD["record.divergence"]
+    if run.diverged is None:
+        return claim.judge(max(float(size.max()) / SIZE - 1.0, 0.0), f"the largest size is {size.max():.3g}")
+    named = np.flatnonzero(run.times == run.diverged.time)
+    if not named.size:
+        return claim.judge(_NONE, f"t = {run.diverged.time!r} is no instant of the record")
+    k = int(named[0])
+    before, then = float(size[:k].max(initial=0.0)), float(size[k])
+    off = abs(float(size.max()) / run.diverged.size - 1.0)
+    return claim.judge(
+        max(before / SIZE - 1.0, 1.0 - then / SIZE, off), f"size {then:.6g} at t = {run.diverged.time:g}"
+    )
 
 
 def _contradictions(run: Run) -> list[tuple[float, str]]:

@@ -15,7 +15,7 @@ from tadcore.verification.report import VerificationReport
 
 from .arrays import check_arrays
 from .certificates import check_certified, check_synthesis
-from .ending import check_outcome, check_start, check_times
+from .ending import check_divergence, check_outcome, check_start, check_times
 from .motion import check_costs, check_motion
 from .strategies import check_admissible, check_control, check_last_row, check_network, check_theta
 
@@ -44,7 +44,8 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     values = m.values(equilibrium.P)[:, :length]
     rows = stacked_rows(equilibrium.feedback, run.scenario.players)[:length]
     rows[:, : run.gains.shape[1]] = run.gains
-    checks = [whole, check_start(run), check_times(run), check_outcome(run), check_network(run), check_admissible(run)]
+    checks = [whole, check_start(run), check_times(run), check_outcome(run), check_divergence(run)]
+    checks += [check_network(run), check_admissible(run)]
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows decides nothing
         if length > 1:
             checks += [*check_motion(run, m, rows), check_control(run, rows), check_theta(run, m, values)]

@@ -23,9 +23,9 @@ pub fn sweep_any(
         let z = &mut blocks.z[block * n * d..][..n * d];
         let sight = &blocks.sight[block * blocks.sight_step..][..shape.rows];
         let capture = &blocks.capture[block * blocks.capture_step..][..n];
-        let caught = observe_any(shape, z, sight, capture, keys) & playing;
-        if caught != 0 {
-            return Stop::Caught(block, caught);
+        let over = observe_any(shape, z, sight, capture, &blocks.far[block], keys) & playing;
+        if over != 0 {
+            return Stop::Over(block, over);
         }
         let mut slots = [0; LANES];
         for (l, slot) in slots.iter_mut().enumerate() {
@@ -55,11 +55,11 @@ pub fn sweep_any(
     Stop::End
 }
 
-/// The keys of one block, and a bit for each trial in which somebody is caught.
-pub fn observe_any(shape: &Shape, z: &[Lane], sight: &[Lane], capture: &[Lane], keys: &mut Keys) -> u32 {
+/// The keys of one block, and a bit for each trial in which somebody is caught or far off.
+pub fn observe_any(shape: &Shape, z: &[Lane], sight: &[Lane], capture: &[Lane], far: &Lane, keys: &mut Keys) -> u32 {
     let (n, m, d) = (shape.size, shape.rows, shape.dim);
     keys.fill([0; LANES]);
-    let mut caught = [0; LANES];
+    let (mut over, mut most) = ([0; LANES], [0.0; LANES]);
     for i in 0..n {
         for j in 0..=i {
             let mut d2 = [0.0; LANES];
@@ -80,10 +80,15 @@ pub fn observe_any(shape: &Shape, z: &[Lane], sight: &[Lane], capture: &[Lane], 
             }
             if i == j {
                 for l in 0..LANES {
-                    caught[l] |= u32::from(d2[l] <= capture[i][l]) << l;
+                    over[l] |= u32::from(d2[l] <= capture[i][l]) << l;
+                    most[l] = if i == 0 || most[l] < d2[l] { d2[l] } else { most[l] };
                 }
             }
         }
     }
-    caught.into_iter().fold(0, |all, bit| all | bit)
+    for l in 0..LANES {
+        let near = most[l] <= far[l];
+        over[l] |= u32::from(!near) << l;
+    }
+    over.into_iter().fold(0, |all, bit| all | bit)
 }

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | z | [`Blocks::z`] | row j on axis x of eight trials lies in one [`Lane`], at block · N·dim + j·dim + x |
 //! | ζ², σ² | [`Blocks::sight`], [`Blocks::capture`] | squared reaches, a lane each, or one block shared by all |
+//! | max ‖z_i‖² | [`Blocks::far`] | the squared distance from the attacker beyond which a trial is looked at |
 //! | 𝒜 | [`Keys`] | bit i·N + j: player i sees player j (j = i: the attacker) |
 //! | exp(Cδ) | [`StepTable`] | by columns, so that a column times one number is a vector operation |
 //!
@@ -40,6 +41,8 @@ pub struct Blocks {
     pub sight: Vec<Lane>,
     /// Squared capture radii, N lanes a block: d₁…d_n, then the attacker's on the target's row.
     pub capture: Vec<Lane>,
+    /// The squared distance from the attacker that nobody passes unseen, a lane each block.
+    pub far: Vec<Lane>,
     /// Lanes from one block's sight to the next: 0 where all trials share one.
     pub sight_step: usize,
     /// The same for the capture radii.
@@ -53,8 +56,8 @@ pub struct Blocks {
 pub enum Stop {
     /// Every block has made its step.
     End,
-    /// Some live trials of a block are over (a bit each); the block has not moved.
-    Caught(usize, u32),
+    /// In some live trials of a block (a bit each) somebody is caught, or far off; the block has not moved.
+    Over(usize, u32),
     /// Some topologies of a block are not in the table; the block has not moved.
     Missing(usize),
 }
@@ -71,8 +74,9 @@ pub type Sweep = fn(Width, &Shape, &mut Blocks, usize, &StepTable, Option<&StepT
 impl Blocks {
     /// Copies a trial from one place to another.
     pub fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
-        let steps = [shape.size * shape.dim, self.sight_step, self.capture_step];
-        for (lanes, step) in [&mut self.z, &mut self.sight, &mut self.capture].into_iter().zip(steps) {
+        let steps = [shape.size * shape.dim, self.sight_step, self.capture_step, 1];
+        let all = [&mut self.z, &mut self.sight, &mut self.capture, &mut self.far];
+        for (lanes, step) in all.into_iter().zip(steps) {
             for e in 0..step {
                 lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
             }

@@ -1,4 +1,4 @@
-//! One step of eight trials at a time: who is caught, who sees whom, and the product, in vector registers.
+//! One step of eight trials at a time: who is caught or far off, who sees whom, and the product, in vector registers.
 //!
 //! Every sum runs in the order of a run that is recorded and no product is fused with a sum, so that a trial
 //! ends bitwise as it would alone, at every [`Width`].
@@ -62,18 +62,22 @@ fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight
     sum
 }
 
-/// The keys of one block, and a bit for each trial in which somebody is caught.
+/// The keys of one block, and a bit for each trial in which somebody is caught or far off.
 #[inline(always)]
 pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
     z: &[Lane],
     sight: &[Lane],
     capture: &[Lane],
+    far: &Lane,
 ) -> (V::Keys, u8) {
     let mut keys = V::no_keys();
     let mut caught = 0;
+    let mut most = V::Eight::splat(0.0);
     unrolled!(I < N, {
         let d2 = norm::<V, D>(z, I);
         caught |= V::Eight::bits(d2.at_most(V::Eight::load(&capture[I]))) as u8;
+        // What is no number in one row is none in any row a step later: the first row alone has to show it.
+        most = if I == 0 { d2 } else { most.or_larger(d2) };
         if I < M {
             keys = V::set(keys, 1 << (I * N + I), d2.at_most(V::Eight::load(&sight[I])));
         }
@@ -85,7 +89,7 @@ pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
             keys = V::set(keys, 1 << (J * N + I), d2.at_most(V::Eight::load(&sight[J])));
         });
     });
-    (keys, caught)
+    (keys, caught | !(V::Eight::bits(most.at_most(V::Eight::load(far))) as u8))
 }
 
 /// z ← exp(Cδ) z for one block whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
@@ -189,11 +193,11 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
             let block = first + ready;
             let sight = &blocks.sight[block * blocks.sight_step..][..M];
             let capture = &blocks.capture[block * blocks.capture_step..][..N];
-            let (seen, caught) = observe::<V, N, M, D>(z, sight, capture);
-            if caught != 0 {
-                let caught = u32::from(caught) & playing(blocks.live, block);
-                if caught != 0 {
-                    stop = Stop::Caught(block, caught);
+            let (seen, over) = observe::<V, N, M, D>(z, sight, capture, &blocks.far[block]);
+            if over != 0 {
+                let over = u32::from(over) & playing(blocks.live, block);
+                if over != 0 {
+                    stop = Stop::Over(block, over);
                     break;
                 }
             }

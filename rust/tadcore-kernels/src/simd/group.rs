@@ -77,6 +77,10 @@ impl<T: Number, const N: usize> Number for Group<T, N> {
         each!(self; i => self.0[i].abs())
     }
     #[inline(always)]
+    fn or_larger(self, other: Self) -> Self {
+        each!(self; i => self.0[i].or_larger(other.0[i]))
+    }
+    #[inline(always)]
     fn less(self, other: Self) -> Self::Mask {
         let mut mask = [self.0[0].less(other.0[0]); N];
         for i in 1..N {

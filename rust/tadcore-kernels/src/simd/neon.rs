@@ -17,19 +17,21 @@ register!(
     /// Two numbers in a register.
     F64x2 float64x2_t f64 uint64x2_t 2 false: vaddq_f64 vsubq_f64 vmulq_f64 vdivq_f64
     plus_f64 minus_f64 vsqrtq_f64 vabsq_f64 vdupq_n_f64 vld1q_f64
-    vst1q_f64 select_f64 mask_64 bits_64, vcltq_f64, vcleq_f64
+    vst1q_f64 select_f64 mask_64 bits_64 larger_f64, vcltq_f64, vcleq_f64
 );
 
 register!(
     /// Four numbers in single precision.
     F32x4 float32x4_t f32 uint32x4_t 4 true: vaddq_f32 vsubq_f32 vmulq_f32 vdivq_f32
     plus_f32 minus_f32 vsqrtq_f32 vabsq_f32 vdupq_n_f32 vld1q_f32
-    vst1q_f32 select_f32 mask_32 bits_32, vcltq_f32, vcleq_f32
+    vst1q_f32 select_f32 mask_32 bits_32 larger_f32, vcltq_f32, vcleq_f32
 );
 
-/// x·y + to, to − x·y, rounded once, and a choice: the same instructions with their operands in another order.
+/// x·y + to, to − x·y, rounded once, and a choice: the same instructions with their operands in another order. The
+/// larger of two, the second where one is no number.
 macro_rules! ordered {
-    ($register:ident $mask:ident: $plus:ident $fma:ident, $minus:ident $fms:ident, $select:ident $bsl:ident) => {
+    ($register:ident $mask:ident: $plus:ident $fma:ident, $minus:ident $fms:ident, $select:ident $bsl:ident,
+     $larger:ident $above:ident) => {
         #[inline(always)]
         fn $plus(x: $register, y: $register, to: $register) -> $register {
             // SAFETY: the target has NEON; registers alone.
@@ -45,10 +47,17 @@ macro_rules! ordered {
             // SAFETY: the target has NEON; registers alone.
             unsafe { $bsl(mask, yes, no) }
         }
+        #[inline(always)]
+        fn $larger(a: $register, b: $register) -> $register {
+            // SAFETY: the target has NEON; registers alone.
+            unsafe { $bsl($above(a, b), a, b) }
+        }
     };
 }
-ordered!(float64x2_t uint64x2_t: plus_f64 vfmaq_f64, minus_f64 vfmsq_f64, select_f64 vbslq_f64);
-ordered!(float32x4_t uint32x4_t: plus_f32 vfmaq_f32, minus_f32 vfmsq_f32, select_f32 vbslq_f32);
+ordered!(float64x2_t uint64x2_t: plus_f64 vfmaq_f64, minus_f64 vfmsq_f64, select_f64 vbslq_f64,
+    larger_f64 vcgtq_f64);
+ordered!(float32x4_t uint32x4_t: plus_f32 vfmaq_f32, minus_f32 vfmsq_f32, select_f32 vbslq_f32,
+    larger_f32 vcgtq_f32);
 
 /// A mask from its bits, and back.
 #[inline(always)]

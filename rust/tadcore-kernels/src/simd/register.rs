@@ -7,7 +7,7 @@
 macro_rules! register {
     ($(#[$doc:meta])* $type:ident $register:ident $scalar:ident $mask:ident $lanes:literal $single:literal:
      $add:ident $sub:ident $mul:ident $div:ident $plus:ident $minus:ident $sqrt:ident $abs:ident $set:ident $load:ident
-     $store:ident $select:ident $from_bits:ident $to_bits:ident, $less:path, $at_most:path) => {
+     $store:ident $select:ident $from_bits:ident $to_bits:ident $larger:ident, $less:path, $at_most:path) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy)]
         pub struct $type(pub $register);
@@ -72,6 +72,11 @@ macro_rules! register {
             fn at_most(self, other: Self) -> $mask {
                 // SAFETY: the caller is compiled for these instructions; registers alone.
                 unsafe { $at_most(self.0, other.0) }
+            }
+            #[inline(always)]
+            fn or_larger(self, other: Self) -> Self {
+                // SAFETY: the caller is compiled for these instructions; registers alone.
+                unsafe { Self($larger(other.0, self.0)) } // the second where one is no number
             }
             #[inline(always)]
             fn select(mask: $mask, yes: Self, no: Self) -> Self {

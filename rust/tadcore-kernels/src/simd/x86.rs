@@ -13,21 +13,21 @@ register!(
     /// AVX2: four numbers in a register.
     F64x4 __m256d f64 __m256d 4 false: _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
     _mm256_fmadd_pd _mm256_fnmadd_pd _mm256_sqrt_pd absolute_pd _mm256_set1_pd _mm256_loadu_pd
-    _mm256_storeu_pd select_pd mask_pd bits_pd, _mm256_cmp_pd::<_CMP_LT_OQ>, _mm256_cmp_pd::<_CMP_LE_OQ>
+    _mm256_storeu_pd select_pd mask_pd bits_pd _mm256_max_pd, _mm256_cmp_pd::<_CMP_LT_OQ>, _mm256_cmp_pd::<_CMP_LE_OQ>
 );
 
 register!(
     /// AVX2: eight numbers in single precision.
     F32x8 __m256 f32 __m256 8 true: _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps
     _mm256_fmadd_ps _mm256_fnmadd_ps _mm256_sqrt_ps absolute_ps _mm256_set1_ps _mm256_loadu_ps
-    _mm256_storeu_ps select_ps mask_ps bits_ps, _mm256_cmp_ps::<_CMP_LT_OQ>, _mm256_cmp_ps::<_CMP_LE_OQ>
+    _mm256_storeu_ps select_ps mask_ps bits_ps _mm256_max_ps, _mm256_cmp_ps::<_CMP_LT_OQ>, _mm256_cmp_ps::<_CMP_LE_OQ>
 );
 
 register!(
     /// AVX-512: eight numbers in a register.
     F64x8 __m512d f64 __mmask8 8 false: _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
     _mm512_fmadd_pd _mm512_fnmadd_pd _mm512_sqrt_pd _mm512_abs_pd _mm512_set1_pd _mm512_loadu_pd
-    _mm512_storeu_pd _mm512_mask_blend_pd mask_8 bits_of,
+    _mm512_storeu_pd _mm512_mask_blend_pd mask_8 bits_of _mm512_max_pd,
     _mm512_cmp_pd_mask::<_CMP_LT_OQ>, _mm512_cmp_pd_mask::<_CMP_LE_OQ>
 );
 
@@ -35,7 +35,7 @@ register!(
     /// AVX-512: sixteen numbers in single precision.
     F32x16 __m512 f32 __mmask16 16 true: _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps
     _mm512_fmadd_ps _mm512_fnmadd_ps _mm512_sqrt_ps _mm512_abs_ps _mm512_set1_ps _mm512_loadu_ps
-    _mm512_storeu_ps _mm512_mask_blend_ps mask_16 bits_of,
+    _mm512_storeu_ps _mm512_mask_blend_ps mask_16 bits_of _mm512_max_ps,
     _mm512_cmp_ps_mask::<_CMP_LT_OQ>, _mm512_cmp_ps_mask::<_CMP_LE_OQ>
 );
 
@@ -43,7 +43,7 @@ register!(
     /// AVX-512VL: eight numbers in single precision, in half a register.
     F32x8Masked __m256 f32 __mmask8 8 true: _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps
     _mm256_fmadd_ps _mm256_fnmadd_ps _mm256_sqrt_ps absolute_ps _mm256_set1_ps _mm256_loadu_ps
-    _mm256_storeu_ps _mm256_mask_blend_ps mask_8 bits_of,
+    _mm256_storeu_ps _mm256_mask_blend_ps mask_8 bits_of _mm256_max_ps,
     _mm256_cmp_ps_mask::<_CMP_LT_OQ>, _mm256_cmp_ps_mask::<_CMP_LE_OQ>
 );
 

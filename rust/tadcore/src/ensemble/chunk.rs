@@ -10,12 +10,12 @@ use super::sweep::sweep_of;
 use super::{Batch, Between, End};
 use crate::cancel::CancelToken;
 use crate::error::{NoMemory, RunError};
-use crate::game::validation::BEYOND;
 use crate::network::{Topology, squared_reach};
 use crate::policy::Policy;
 use crate::policy::filler::Filler;
 use crate::policy::step_table::StepTable;
 use crate::simd::Width;
+use crate::simulation::divergence::{self, within};
 use crate::simulation::{Outcome, Reach};
 
 /// The scratch of one worker, reused from chunk to chunk.
@@ -77,8 +77,14 @@ impl<'a> Chunk<'a> {
         let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who = (0..trials as u32).collect();
-        let blocks = Blocks { z, sight, capture, sight_step, capture_step, live: trials };
-        Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), blocks, who }
+        let far = vec![[0.0; LANES]; blocks];
+        let blocks = Blocks { z, sight, capture, far, sight_step, capture_step, live: trials };
+        let mut chunk = Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), blocks, who };
+        for place in 0..chunk.blocks.far.len() * LANES {
+            let scale = divergence::scale(&chunk.state(place), dim);
+            chunk.blocks.far[place / LANES][place % LANES] = divergence::limit(scale);
+        }
+        chunk
     }
 
     /// Plays every trial to its end.
@@ -119,7 +125,8 @@ impl<'a> Chunk<'a> {
             }
         }
         transitions.count(lookups.max(misses), misses);
-        self.finish(last, ends)
+        self.finish(last, ends);
+        Ok(())
     }
 
     /// Moves every block that can move, and lists those that wait with the topologies they miss.
@@ -128,7 +135,7 @@ impl<'a> Chunk<'a> {
         loop {
             match (self.sweep)(self.width, &self.shape, &mut self.blocks, from, table, next, &mut w.keys) {
                 Stop::End => return,
-                Stop::Caught(block, lanes) => {
+                Stop::Over(block, lanes) => {
                     self.retire(block, lanes, k, ends);
                     from = block;
                 }
@@ -189,14 +196,29 @@ impl<'a> Chunk<'a> {
         Reach::new(self.batch.capture_row(trial, self.shape.size)).ends(&self.state(place), self.shape.dim)
     }
 
-    /// Takes the trials in `lanes` of a block out; the last ones take their places.
+    /// Whether the trial in one place is over at t_k, and how; notes that it diverged, which is no end.
+    fn ends(&mut self, place: usize, k: usize, end: &mut End) -> bool {
+        let last = self.policy.game().grid().steps();
+        let far = divergence::reach(&self.state(place), self.shape.dim);
+        let limit = self.blocks.far[place / LANES][place % LANES];
+        if !within(far, limit) {
+            end.diverged = true;
+            self.blocks.far[place / LANES][place % LANES] = divergence::LAST;
+        }
+        // Where the numbers end nobody is caught any more.
+        let outcome = if within(far, divergence::LAST) { self.outcome(place) } else { Some(Outcome::Timeout) };
+        end.step = if outcome == Some(Outcome::Timeout) { last } else { k };
+        end.outcome = outcome.unwrap_or(Outcome::Timeout);
+        outcome.is_some()
+    }
+
+    /// Looks at the trials in `lanes` of a block, and takes those out that are over; the last ones take their places.
     fn retire(&mut self, block: usize, lanes: u32, k: usize, ends: &mut [End]) {
         // From the highest lane down, so that a trial that moves in has not been looked at.
         for lane in (0..LANES).rev().filter(|lane| lanes >> lane & 1 == 1) {
             let place = block * LANES + lane;
-            if let Some(outcome) = self.outcome(place) {
-                let end = &mut ends[self.who[place] as usize];
-                (end.outcome, end.step) = (outcome, k);
+            if !self.ends(place, k, &mut ends[self.who[place] as usize]) {
+                continue;
             }
             self.remove(place);
         }
@@ -220,18 +242,10 @@ impl<'a> Chunk<'a> {
     }
 
     /// The trials that are left at T: caught in the last instant, or out of time.
-    ///
-    /// A state that left the range of double precision ends up here: what is no number lies within no radius.
-    fn finish(&mut self, last: usize, ends: &mut [End]) -> Result<(), RunError> {
+    fn finish(&mut self, last: usize, ends: &mut [End]) {
         for place in 0..self.blocks.live {
-            let trial = self.who[place] as usize;
-            if !self.state(place).iter().all(|x| x.abs() <= BEYOND) {
-                let time = self.policy.game().grid().horizon();
-                return Err(RunError::Range { trial: Some(self.first + trial), time });
-            }
-            (ends[trial].outcome, ends[trial].step) = (self.outcome(place).unwrap_or(Outcome::Timeout), last);
+            self.ends(place, last, &mut ends[self.who[place] as usize]);
         }
-        Ok(())
     }
 }
 

@@ -10,6 +10,7 @@
 //! |---|---|---|
 //! | X(0) | [`Batch::positions`] | initial positions |
 //! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
+//! | max ‖z_i‖ | [`End::diverged`] | whether a trial diverges: [`crate::simulation::divergence`] |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
 mod between;
@@ -46,6 +47,8 @@ pub struct End {
     pub outcome: Outcome,
     /// The grid index.
     pub step: usize,
+    /// Whether the game diverged before its end or at it.
+    pub diverged: bool,
     /// How long after that instant: 0 unless the game ended at a crossing between two.
     pub after: f64,
     /// Whether a capture radius was entered between two instants, where that was asked for.
@@ -68,14 +71,15 @@ impl Between {
 
 impl End {
     /// What an end is before its trial is played.
-    pub(super) const NOT_PLAYED: Self = Self { outcome: Outcome::Timeout, step: 0, after: 0.0, passed: false };
+    pub(super) const NOT_PLAYED: Self =
+        Self { outcome: Outcome::Timeout, step: 0, diverged: false, after: 0.0, passed: false };
 }
 
 /// As a batch has it that does not look for passes.
 impl From<&Record> for End {
     fn from(record: &Record) -> Self {
         let (outcome, step, after) = (record.outcome, record.grid_index(), record.after);
-        Self { outcome, step, after, passed: false }
+        Self { outcome, step, diverged: record.diverged.is_some(), after, passed: false }
     }
 }
 
@@ -123,7 +127,7 @@ fn row(all: &[f64], width: usize, i: usize) -> &[f64] {
     &all[i * width..(i + 1) * width]
 }
 
-/// Plays every game of `batch`; outcomes and final grid indices in order.
+/// Plays every game of `batch`; how each ended, in order.
 ///
 /// # Errors
 /// [`RunError`] for the first row that breaks a rule, before anything is played, or when the caller cancelled.

@@ -4,7 +4,7 @@ use tadcore_kernels::ensemble::anysize::{observe_any, sweep_any};
 use tadcore_kernels::ensemble::block::{Blocks, LANES, Lane, Shape, Stop};
 use tadcore_kernels::ensemble::sweep::{observe, sweep_of};
 
-use crate::network::{self, Topology, squared_reach};
+use crate::network::{self, Topology, squared_norm, squared_reach};
 use crate::policy::step_table::StepTable;
 use crate::simd::{Baseline, Simd, Width};
 use crate::simulation::Reach;
@@ -23,20 +23,33 @@ fn rims_belong_to_the_balls_at_every_size() {
         let sight: Vec<Lane> = (0..2).map(|i| std::array::from_fn(|l| radius(l, i))).collect();
         let capture: Vec<Lane> = (0..3).map(|i| std::array::from_fn(|l| radius(l, i + 2))).collect();
         let mut keys = vec![[0; LANES]];
-        let caught = observe_any(&shape, &z, &sight, &capture, &mut keys);
-        let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture);
+        let any = [f64::INFINITY; LANES];
+        let caught = observe_any(&shape, &z, &sight, &capture, &any, &mut keys);
+        let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture, &any);
         assert_eq!((keys[0], caught), (Baseline::keys(compiled), u32::from(ends)));
-        // With nothing on the table a sweep stops with what it saw, or with whom it caught.
+        // With nothing on the table a sweep stops with what it saw, or with who is caught or beyond the limit: in the
+        // second trial on the limit, in the last three a double beyond it, no number, and infinitely far.
         let nothing = [-1.0; LANES];
-        for (capture, caught) in [(capture, caught), (vec![nothing; 3], 0)] {
-            let expected = if caught == 0 { Stop::Missing(0) } else { Stop::Caught(0, caught) };
+        let most: Lane = std::array::from_fn(|l| (0..3).map(|i| squared_norm(&row(l, i))).fold(0.0, f64::max));
+        let limits: Lane = std::array::from_fn(|l| if l == LANES - 3 { most[l].next_down() } else { most[l] });
+        let cases =
+            [(capture.clone(), any, caught), (vec![nothing; 3], any, 0), (vec![nothing; 3], limits, 0b1110_0000)];
+        for (capture, far, over) in cases {
+            let mut z = z.clone();
+            if far == limits {
+                z.iter_mut().for_each(|lane| lane[LANES - 2] = f64::NAN);
+                z[turn % 6][LANES - 1] = f64::INFINITY;
+            }
+            let expected = if over == 0 { Stop::Missing(0) } else { Stop::Over(0, over) };
+            assert_eq!(observe_any(&shape, &z, &sight, &capture, &far, &mut vec![[0; LANES]]), over);
             for width in Width::all() {
                 let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
-                let mut blocks = Blocks { z, sight, capture, sight_step: 0, capture_step: 0, live: LANES };
+                let far = vec![far];
+                let mut blocks = Blocks { z, sight, capture, far, sight_step: 0, capture_step: 0, live: LANES };
                 let mut seen = vec![[0; LANES]];
                 let stop = sweep_of(&shape)(width, &shape, &mut blocks, 0, &StepTable::new(2, 3), None, &mut seen);
                 assert_eq!(stop, expected, "{width:?}");
-                assert!(caught != 0 || seen == keys, "{width:?}");
+                assert!(over != 0 || seen == keys, "{width:?}");
             }
         }
         for l in 0..LANES {
@@ -65,6 +78,7 @@ fn blocks_stop_where_single_strips_do() {
         z: (0..40 * 8).map(|e| std::array::from_fn(|l| 2.0 * wave(8 * e + l))).collect(),
         sight: vec![[4.0; LANES], [2.0; LANES], [1.0; LANES]],
         capture: vec![[0.04; LANES]; 4],
+        far: vec![[f64::INFINITY; LANES]; 40],
         sight_step: 0,
         capture_step: 0,
         live: 40 * LANES - 3,
@@ -79,7 +93,7 @@ fn blocks_stop_where_single_strips_do() {
             assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
             match stop {
                 Stop::End => break,
-                Stop::Caught(block, _) => {
+                Stop::Over(block, _) => {
                     // All eight a long way off, where nobody sees or catches anybody.
                     for all in [&mut ours, &mut single] {
                         all.z[8 * block..][..8]

@@ -6,17 +6,21 @@
 //! | σ | [`Reach`] | capture radii |
 //! | ζ | [`Setup::visibility`] | visibility radii |
 //!
+//! A game that [diverges](divergence) is played on, and says so.
+//!
 //! The sampled-data reading of the paper: feedback and network are held between grid instants
 //! (zero-order hold), the motion is exact.
 
 pub(crate) mod crossing;
+pub mod divergence;
 mod outcome;
 pub(crate) mod passes;
 mod record;
 mod setup;
 
+pub use divergence::DIVERGED;
 pub use outcome::{Outcome, Reach, distance, relative_state};
 pub use passes::{Pass, Termination};
 pub(crate) use record::apply;
-pub use record::{Record, simulate, simulate_with};
+pub use record::{Divergence, Record, simulate, simulate_with};
 pub use setup::Setup;

@@ -1,5 +1,6 @@
 //! One game, everything recorded.
 
+use super::divergence;
 use super::outcome::{Outcome, Reach, relative_state};
 use super::passes::{Pass, Step, Termination};
 use super::setup::Setup;
@@ -12,12 +13,23 @@ use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
 use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
 
+/// When a run diverged, and how far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Divergence {
+    /// The grid index of the first instant beyond [`divergence::DIVERGED`].
+    pub step: usize,
+    /// The largest distance to the attacker up to the end, over the largest distance between players at the start; where
+    /// the game leaves the range of double precision, a lower bound.
+    pub size: f64,
+}
+
 /// What asks for memory here.
 const WHAT: &str = "the record of one run";
 
 /// A recorded run of L steps: L + 1 rows, the last the terminal state.
 ///
-/// No step follows the terminal state; its row carries the last network in force and the feedback under it.
+/// No step follows the terminal state; its row carries the last network in force and the feedback under it. Where a game
+/// that diverged leaves the range of double precision, the record stops before: it is shorter than the game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// How it ended.
@@ -29,6 +41,10 @@ pub struct Record {
     pub after: f64,
     /// Capture radii that were entered between two instants, in the order of time.
     pub passes: Vec<Pass>,
+    /// The grid index of the end, or of the instant before it: that of the last row, unless the record stops before.
+    pub end: usize,
+    /// Whether and when the game diverged, before its end or at it.
+    pub diverged: Option<Divergence>,
     /// Axes.
     pub dim: usize,
     /// (L + 1) × (n + 2) × dim.
@@ -54,8 +70,8 @@ pub struct Record {
 /// Runs one game and records everything.
 ///
 /// # Errors
-/// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision, or when
-/// the caller cancelled.
+/// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision without
+/// having diverged, or when the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
     simulate_with(policy, setup, &EdgeRule::PAPER, Termination::Sampled, cancel)
 }
@@ -90,6 +106,8 @@ pub fn simulate_with(
         steps: 0,
         after: 0.0,
         passes: Vec::new(),
+        end: 0,
+        diverged: None,
         dim,
         positions: Vec::new(),
         controls: Vec::new(),
@@ -103,8 +121,20 @@ pub fn simulate_with(
     };
     let last = game.grid().steps();
     let mut next = vec![0.0; size * dim];
+    let scale = divergence::scale(&z, dim);
+    let (limit, mut most, mut recording) = (divergence::limit(scale), 0.0, true);
     for k in 0..=last {
         cancel.check()?;
+        let far = divergence::reach(&z, dim);
+        if record.diverged.is_none() && !divergence::within(far, limit) {
+            record.diverged = Some(Divergence { step: k, size: 0.0 });
+        }
+        most = f64::max(most, if divergence::within(far, divergence::LAST) { far } else { divergence::LAST });
+        if k > 0 && !divergence::within(far, divergence::LAST) {
+            // Nobody is caught any more, and the numbers end.
+            record.end = last;
+            break;
+        }
         let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
         if end.is_none() || k == 0 {
             match &mut edges {
@@ -113,14 +143,20 @@ pub fn simulate_with(
             }
         }
         let step = policy.at(k, &topology, &mut solver, cancel)?;
-        record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
-        record.count(&step);
-        if !record.last_row_is_bounded(n + 2) {
-            return Err(RunError::Range { trial: None, time: game.grid().time(k) });
+        if recording {
+            record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+            recording = record.last_row_is_bounded(n + 2);
+            if recording {
+                record.count(&step);
+                record.steps = k;
+            } else if record.diverged.is_some() && k > 0 {
+                record.pop(n + 2);
+            } else {
+                return Err(RunError::Range { time: game.grid().time(k) });
+            }
         }
         if let Some(outcome) = end {
-            record.outcome = outcome;
-            record.steps = k;
+            (record.outcome, record.end) = (outcome, k);
             break;
         }
         let before = (termination == Termination::Continuous).then(|| attacker.clone());
@@ -131,14 +167,20 @@ pub fn simulate_with(
             Some(from) => {
                 if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {
                     let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
-                    record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
-                    record.certified += usize::from(step.gains.certified);
-                    (record.outcome, record.after, record.steps) = (Pass::outcome(row, n), after, k + 1);
+                    if recording {
+                        record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+                        record.certified += usize::from(step.gains.certified);
+                        record.steps = k + 1;
+                    }
+                    (record.outcome, record.after, record.end) = (Pass::outcome(row, n), after, k);
                     break;
                 }
             }
         }
         std::mem::swap(&mut z, &mut next);
+    }
+    if let Some(diverged) = &mut record.diverged {
+        diverged.size = (most / scale).sqrt();
     }
     Ok(record)
 }
@@ -168,7 +210,7 @@ impl Record {
     /// The grid index of the end, or of the instant before it.
     #[must_use]
     pub fn grid_index(&self) -> usize {
-        self.steps - usize::from(self.after > 0.0)
+        self.end
     }
 
     /// When the game ended.
@@ -180,13 +222,25 @@ impl Record {
     /// When row i was recorded.
     #[must_use]
     pub fn time_of(&self, i: usize, grid: &Grid) -> f64 {
-        if i == self.steps { self.time(grid) } else { grid.time(i) }
+        if self.after > 0.0 && i == self.end + 1 { self.time(grid) } else { grid.time(i) }
     }
 
     fn last_row_is_bounded(&self, players: usize) -> bool {
         let row = players * self.dim;
         let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
         tails.into_iter().flatten().all(|x| x.abs() <= BEYOND) && self.theta.last().is_some_and(|x| x.is_finite())
+    }
+
+    /// Takes the last row back.
+    fn pop(&mut self, players: usize) {
+        let row = players * self.dim;
+        let (terms, gains) = (self.terms.len() / self.networks.len(), self.gains.len() / self.networks.len());
+        for (all, width) in [(&mut self.positions, row), (&mut self.controls, row), (&mut self.terms, terms)] {
+            all.truncate(all.len() - width);
+        }
+        self.gains.truncate(self.gains.len() - gains);
+        self.networks.pop();
+        self.theta.pop();
     }
 
     /// Bytes that `rows` rows of a game take.
