@@ -120,7 +120,7 @@ def verify(
     if len(run.times) < 2:
         note = "the game is over at t = 0: there is no play to check"
         return _settled(combine(title, [*parts, VerificationReport("run", (), notes=(note,))]))
-    diverged = getattr(run, "diverged", None)
+    diverged = run.diverged
     if diverged is None:
         parts.append(family("nafne", lambda: check_nafne(run, equilibrium, deviations=deviations, seed=seed)))
     else:

@@ -121,6 +121,15 @@ def test_every_page_is_in_a_toctree():
     assert {*PAGES, *(DOCS / "api").glob("*.rst")} - listed == {DOCS / "index.md"}
 
 
+def test_every_decision_has_a_number_of_its_own():
+    pages = sorted((DOCS / "decisions").glob("0*.md"))
+    numbers = [page.name[:4] for page in pages]
+    assert len(pages) > 10
+    assert len(set(numbers)) == len(pages), numbers
+    for page, number in zip(pages, numbers, strict=True):
+        assert page.read_text(encoding="utf-8").startswith(f"# {number} · "), page.name
+
+
 def test_relative_links_and_pictures_exist():
     for page in [*PAGES, DOCS.parent / "CONTRIBUTING.md"]:
         text = page.read_text(encoding="utf-8")
