@@ -52,8 +52,9 @@ def broken(root: Path) -> list[str]:
 
 
 def main() -> int:
-    """Check the folder named on the command line."""
-    found = broken(Path(sys.argv[1]))
+    """Check the folder named on the command line; one without pages was not built."""
+    root = Path(sys.argv[1])
+    found = broken(root) if _pages(root) else [f"{root}: no pages"]
     print("\n".join(found) or "every local link leads somewhere")
     return 1 if found else 0
 

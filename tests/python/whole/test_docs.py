@@ -143,6 +143,7 @@ def test_the_link_checker_finds_what_leads_nowhere(tmp_path):
         command = [sys.executable, str(DOCS / "check_links.py"), str(tmp_path)]
         return subprocess.run(command, capture_output=True, text=True, check=False)
 
+    assert (check().returncode, check().stdout) == (1, f"{tmp_path}: no pages\n")
     (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="b.html#here">b</a><a href="https://x.y/">x</a>')
     (tmp_path / "b.html").write_text('<p id="here"></p><a href="a.html#top">a</a>')
     assert check().returncode == 0
