@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats, as_amount
 from tadcore.errors import ScenarioError
 from tadcore.simulation.batch import Batch
-from tadcore.statistics.radius import Breakpoints
+from tadcore.statistics.single_radii import Breakpoints
 
 from .replays import Replays
 

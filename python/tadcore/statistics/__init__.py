@@ -8,8 +8,9 @@ from .comparison import Comparison, compare, difference_interval, paired
 from .incidence import Incidence, incidence, incidence_of
 from .intervals import OutcomeProbabilities, probabilities, probabilities_of, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
-from .radius import Breakpoints, RadiusCurve, SmallestRadius
+from .radius import RadiusCurve
 from .sequences import HalfWidth, mixture_interval
+from .single_radii import Breakpoints, SmallestRadius
 from .stopping import Stopping
 
 __all__ = [
