@@ -78,3 +78,12 @@ def test_extras_bring_what_their_part_imports():
         assert module.replace("_", "-") in names["docs"], module
     assert "bokeh" in names["explore"]
     assert "clarabel" in names["bounds"]
+
+
+@pytest.mark.parametrize("package", ["rust/tadcore", "rust/tadcore-kernels", "fuzz"])
+def test_the_fuzz_targets_lock_what_the_core_needs(package):
+    """They are a workspace of their own, which no build of the library brings up to date."""
+    manifest = tomllib.loads((ROOT / package / "Cargo.toml").read_text("utf-8"))
+    locked = tomllib.loads((ROOT / "fuzz" / "Cargo.lock").read_text("utf-8"))["package"]
+    found = next(entry for entry in locked if entry["name"] == manifest["package"]["name"])
+    assert {name.partition(" ")[0] for name in found["dependencies"]} == set(manifest["dependencies"])
