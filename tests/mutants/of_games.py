@@ -103,10 +103,10 @@ MUTANTS = {
         ("batches: z = X − X_a", "«x - attacker[e % dim]»", "x + attacker[e % dim]"),
     ],
     "ensemble/block.rs": [
-        ("batches: places that play", "«live - block * LANES»", "live + block * LANES"),
-        ("batches: lanes that play", "=> «(1 << count) - 1»,", "(1 << count) | 1"),
-        ("batches: lane of a copy", "[«from % LANES»]", "to % LANES"),
-        ("batches: block of a copy", "lanes[«from / LANES * step + e»]", "to / LANES * step + e"),
+        ("batches: places that play", "«live - block * BLOCK»", "live + block * BLOCK"),
+        ("batches: trials that play", "=> «(1 << count) - 1»,", "(1 << count) | 1"),
+        ("batches: trial of a copy", "[«from % BLOCK»]", "to % BLOCK"),
+        ("batches: block of a copy", "numbers[«from / BLOCK * step + e»]", "to / BLOCK * step + e"),
     ],
     "ensemble/sweep.rs": [
         (
@@ -137,11 +137,11 @@ MUTANTS = {
         ("batches: column of a matrix", "V::Four::load(&t[«j * Q + q»])", "(N - j) * Q + q"),
         (
             "batches: exp(Cδ) z",
-            "next[x][q][l] + column * V::Four::splat(«z[j * D + x][lane]»)",
-            "-z[j * D + x][lane]",
+            "next[x][q][l] + column * V::Four::splat(«z[j * D + x][member]»)",
+            "-z[j * D + x][member]",
         ),
-        ("batches: exp(Cδ) z, first column", "V::Four::load(&t[q]) * V::Four::splat(«z[x][lane]»)", "-z[x][lane]"),
-        ("batches: lane of a half", "let lane = «4 * half + l»;", "l"),
+        ("batches: exp(Cδ) z, first column", "V::Four::load(&t[q]) * V::Four::splat(«z[x][member]»)", "-z[x][member]"),
+        ("batches: trial of a half", "let member = «4 * half + l»;", "l"),
         ("batches: rows as columns", "«V::transpose(next[x][q])»", "next[x][q]"),
         ("batches: row of a result", "z[(«4 * q + r») * D + x]", "r"),
         ("batches: over among who play", "«u32::from(over) & playing(blocks.live, block)»", "u32::from(over)"),

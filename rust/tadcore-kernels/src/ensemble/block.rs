@@ -2,8 +2,8 @@
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
-//! | z | [`Blocks::z`] | row j on axis x of eight trials lies in one [`Lane`], at block · N·dim + j·dim + x |
-//! | ζ², σ² | [`Blocks::sight`], [`Blocks::capture`] | squared reaches, a lane each, or one block shared by all |
+//! | z | [`Blocks::z`] | row j on axis x of eight trials lies in one [`PerTrial`], at block · N·dim + j·dim + x |
+//! | ζ², σ² | [`Blocks::sight`], [`Blocks::capture`] | squared reaches, a [`PerTrial`] each, or one block shared by all |
 //! | max ‖z_i‖² | [`Blocks::far`] | the squared distance from the attacker beyond which a trial is looked at |
 //! | 𝒜 | [`Keys`] | bit i·N + j: player i sees player j (j = i: the attacker) |
 //! | exp(Cδ) | [`StepTable`] | by columns, so that a column times one number is a vector operation |
@@ -15,9 +15,9 @@ use crate::policy::step_table::StepTable;
 use crate::simd::Width;
 
 /// Trials side by side.
-pub const LANES: usize = 8;
+pub const BLOCK: usize = 8;
 /// One number of each of them.
-pub type Lane = [f64; LANES];
+pub type PerTrial = [f64; BLOCK];
 
 /// Sizes of a game, for code that is not compiled for them.
 #[derive(Debug, Clone, Copy)]
@@ -36,14 +36,14 @@ pub struct Shape {
 #[derive(Debug)]
 pub struct Blocks {
     /// States.
-    pub z: Vec<Lane>,
-    /// Squared visibility radii, m lanes a block.
-    pub sight: Vec<Lane>,
-    /// Squared capture radii, N lanes a block: d₁…d_n, then the attacker's on the target's row.
-    pub capture: Vec<Lane>,
-    /// The squared distance from the attacker that nobody passes unseen, a lane each block.
-    pub far: Vec<Lane>,
-    /// Lanes from one block's sight to the next: 0 where all trials share one.
+    pub z: Vec<PerTrial>,
+    /// Squared visibility radii, m a block.
+    pub sight: Vec<PerTrial>,
+    /// Squared capture radii, N a block: d₁…d_n, then the attacker's on the target's row.
+    pub capture: Vec<PerTrial>,
+    /// The squared distance from the attacker that nobody passes unseen, one a block.
+    pub far: Vec<PerTrial>,
+    /// Entries from one block's sight to the next: 0 where all trials share one.
     pub sight_step: usize,
     /// The same for the capture radii.
     pub capture_step: usize,
@@ -62,8 +62,8 @@ pub enum Stop {
     Missing(usize),
 }
 
-/// The topologies of one block, a lane for each word.
-pub type Keys = Vec<[u64; LANES]>;
+/// The topologies of one block: each word of its eight trials.
+pub type Keys = Vec<[u64; BLOCK]>;
 
 /// Moves the blocks from one on by one step, up to the first that cannot move; its keys are left in the last argument.
 ///
@@ -76,9 +76,9 @@ impl Blocks {
     pub fn copy(&mut self, shape: &Shape, from: usize, to: usize) {
         let steps = [shape.size * shape.dim, self.sight_step, self.capture_step, 1];
         let all = [&mut self.z, &mut self.sight, &mut self.capture, &mut self.far];
-        for (lanes, step) in all.into_iter().zip(steps) {
+        for (numbers, step) in all.into_iter().zip(steps) {
             for e in 0..step {
-                lanes[to / LANES * step + e][to % LANES] = lanes[from / LANES * step + e][from % LANES];
+                numbers[to / BLOCK * step + e][to % BLOCK] = numbers[from / BLOCK * step + e][from % BLOCK];
             }
         }
     }
@@ -87,8 +87,8 @@ impl Blocks {
 /// A bit for each place of a block in which one of `live` trials plays.
 #[inline(always)]
 pub fn playing(live: usize, block: usize) -> u32 {
-    match live - block * LANES {
-        count @ 0..LANES => (1 << count) - 1,
+    match live - block * BLOCK {
+        count @ 0..BLOCK => (1 << count) - 1,
         _ => u32::MAX,
     }
 }

@@ -8,7 +8,7 @@
 //! part of the next instant's table.
 
 use super::anysize::sweep_any;
-use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep, playing};
+use super::block::{BLOCK, Blocks, Keys, PerTrial, Shape, Stop, Sweep, playing};
 use crate::policy::index::DIRECT_BITS;
 use crate::policy::step_table::StepTable;
 use crate::simd::{Number, Simd, Width, dispatch};
@@ -40,7 +40,7 @@ macro_rules! unrolled {
 
 /// ‖z_i‖² of eight trials, the axes added in order.
 #[inline(always)]
-fn norm<V: Simd, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
+fn norm<V: Simd, const D: usize>(z: &[PerTrial], i: usize) -> V::Eight {
     let first = V::Eight::load(&z[i * D]);
     let mut sum = first * first;
     for x in 1..D {
@@ -52,7 +52,7 @@ fn norm<V: Simd, const D: usize>(z: &[Lane], i: usize) -> V::Eight {
 
 /// ‖z_i − z_j‖² of eight trials.
 #[inline(always)]
-fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight {
+fn distance<V: Simd, const D: usize>(z: &[PerTrial], i: usize, j: usize) -> V::Eight {
     let first = V::Eight::load(&z[i * D]) - V::Eight::load(&z[j * D]);
     let mut sum = first * first;
     for x in 1..D {
@@ -65,10 +65,10 @@ fn distance<V: Simd, const D: usize>(z: &[Lane], i: usize, j: usize) -> V::Eight
 /// The keys of one block, and a bit for each trial in which somebody is caught or far off.
 #[inline(always)]
 pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
-    z: &[Lane],
-    sight: &[Lane],
-    capture: &[Lane],
-    far: &Lane,
+    z: &[PerTrial],
+    sight: &[PerTrial],
+    capture: &[PerTrial],
+    far: &PerTrial,
 ) -> (V::Keys, u8) {
     let mut keys = V::no_keys();
     let mut caught = 0;
@@ -95,24 +95,24 @@ pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
 /// z ← exp(Cδ) z for one block whose matrices lie in `slots`; a column is Q registers of four, a matrix E = N·Q.
 #[inline(always)]
 fn step<V: Simd, const N: usize, const D: usize, const Q: usize, const E: usize>(
-    z: &mut [Lane],
-    slots: &[u32; LANES],
+    z: &mut [PerTrial],
+    slots: &[u32; BLOCK],
     matrices: &[[[f64; 4]; E]],
 ) {
     for half in 0..2 {
         let mut next = [[[V::Four::splat(0.0); 4]; Q]; D];
         for l in 0..4 {
-            let lane = 4 * half + l;
-            let t = &matrices[slots[lane] as usize];
+            let member = 4 * half + l;
+            let t = &matrices[slots[member] as usize];
             for q in 0..Q {
                 for x in 0..D {
-                    next[x][q][l] = V::Four::load(&t[q]) * V::Four::splat(z[x][lane]);
+                    next[x][q][l] = V::Four::load(&t[q]) * V::Four::splat(z[x][member]);
                 }
                 for j in 1..N {
                     let column = V::Four::load(&t[j * Q + q]);
                     for x in 0..D {
                         // Rounded twice: no product is fused with a sum.
-                        next[x][q][l] = next[x][q][l] + column * V::Four::splat(z[j * D + x][lane]);
+                        next[x][q][l] = next[x][q][l] + column * V::Four::splat(z[j * D + x][member]);
                     }
                 }
             }
@@ -139,17 +139,17 @@ fn look_up<V: Simd, const N: usize, const M: usize>(
     seen: V::Keys,
     direct: &[u16],
     table: &StepTable,
-    slots: &mut [u32; LANES],
+    slots: &mut [u32; BLOCK],
 ) -> bool {
     let mut all = true;
     if N * M <= DIRECT_BITS {
         let mut low = V::low(seen);
         for half in 0..2 {
-            for l in 0..LANES / 2 {
+            for l in 0..BLOCK / 2 {
                 // The mask changes nothing; it tells the compiler that the index lies within the slice.
                 let slot = u32::from(direct[low[half] as usize & (direct.len() - 1)]);
                 low[half] >>= 16;
-                slots[half * LANES / 2 + l] = slot;
+                slots[half * BLOCK / 2 + l] = slot;
                 all &= slot != 0;
             }
         }
@@ -174,8 +174,8 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
     let matrices = table.matrices().as_chunks().0.as_chunks().0;
     let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
     let direct = table.direct().get(..places).unwrap_or(&NOTHING[..places]);
-    let end = blocks.live.div_ceil(LANES);
-    let mut slots = [[0; LANES]; AHEAD];
+    let end = blocks.live.div_ceil(BLOCK);
+    let mut slots = [[0; BLOCK]; AHEAD];
     let mut first = from;
     while first < end {
         let count = AHEAD.min(end - first);

@@ -4,7 +4,7 @@
 //! vector operations who stayed clear, by the largest ‖C‖ among the table's entries at this instant; the few others are
 //! examined exactly, by the arithmetic of a recorded run. None of this runs unless it is asked for.
 
-use super::block::{Blocks, LANES, Lane, playing};
+use super::block::{BLOCK, Blocks, PerTrial, playing};
 use super::chunk::Chunk;
 use super::{Between, End};
 use crate::cancel::CancelToken;
@@ -19,10 +19,10 @@ use crate::synthesis::Synthesizer;
 #[derive(Debug)]
 pub(super) struct Watch {
     between: Between,
-    before: Vec<Lane>,
+    before: Vec<PerTrial>,
     /// Where each trial stood.
     place: Vec<u32>,
-    gathered: Vec<Lane>,
+    gathered: Vec<PerTrial>,
     solver: Synthesizer,
 }
 
@@ -43,7 +43,7 @@ impl Watch {
     /// The state of a trial at that instant.
     fn state(&self, trial: usize, width: usize) -> Vec<f64> {
         let place = self.place[trial] as usize;
-        self.before[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
+        self.before[place / BLOCK * width..][..width].iter().map(|numbers| numbers[place % BLOCK]).collect()
     }
 }
 
@@ -60,23 +60,23 @@ impl Chunk<'_> {
         let (width, step) = (size * dim, self.policy.game().grid().step());
         let stretch = clear(self.policy.transitions().rate(k) * step);
         let mut over = Vec::new();
-        for block in 0..self.blocks.live.div_ceil(LANES) {
-            let places = block * LANES..self.blocks.live.min((block + 1) * LANES);
+        for block in 0..self.blocks.live.div_ceil(BLOCK) {
+            let places = block * BLOCK..self.blocks.live.min((block + 1) * BLOCK);
             let moved_in = places.clone().any(|place| watch.place[self.who[place] as usize] as usize != place);
             watch.gathered.clear();
             watch.gathered.extend_from_slice(&watch.before[block * width..(block + 1) * width]);
             if moved_in {
                 for place in places {
                     let state = watch.state(self.who[place] as usize, width);
-                    watch.gathered.iter_mut().zip(state).for_each(|(lane, x)| lane[place % LANES] = x);
+                    watch.gathered.iter_mut().zip(state).for_each(|(numbers, x)| numbers[place % BLOCK] = x);
                 }
             }
             let now = &self.blocks.z[block * width..(block + 1) * width];
             let capture = &self.blocks.capture[block * self.blocks.capture_step..][..size];
             let bits = near(&watch.gathered, now, capture, dim, stretch) & playing(self.blocks.live, block);
-            for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
-                if self.examine(k, block * LANES + lane, watch, ends, cancel)? {
-                    over.push(block * LANES + lane);
+            for member in (0..BLOCK).filter(|member| bits >> member & 1 == 1) {
+                if self.examine(k, block * BLOCK + member, watch, ends, cancel)? {
+                    over.push(block * BLOCK + member);
                 }
             }
         }
@@ -107,7 +107,7 @@ impl Chunk<'_> {
         }
         let (start, now) = (watch.state(trial, size * dim), self.state(place));
         let sight: Vec<f64> = (0..self.shape.rows)
-            .map(|i| self.blocks.sight[place / LANES * self.blocks.sight_step + i][place % LANES])
+            .map(|i| self.blocks.sight[place / BLOCK * self.blocks.sight_step + i][place % BLOCK])
             .collect();
         let mut network = Topology::empty(self.shape.rows, size);
         observe(&start, dim, &sight, &mut network);

@@ -5,7 +5,7 @@
 //! what is missing is solved and the waiting blocks follow.
 
 use super::between::Watch;
-use super::block::{Blocks, Keys, LANES, Lane, Shape, Stop, Sweep};
+use super::block::{BLOCK, Blocks, Keys, PerTrial, Shape, Stop, Sweep};
 use super::sweep::sweep_of;
 use super::{Batch, Between, End};
 use crate::cancel::CancelToken;
@@ -36,7 +36,7 @@ impl Worker {
         Self {
             filler: Filler::default(),
             local: StepTable::new(rows, size),
-            keys: vec![[0; LANES]; (rows * size).div_ceil(64)],
+            keys: vec![[0; BLOCK]; (rows * size).div_ceil(64)],
             words: Vec::new(),
             missing: Vec::new(),
             waiting: Vec::new(),
@@ -62,27 +62,27 @@ impl<'a> Chunk<'a> {
     pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize, width: Width) -> Self {
         let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
         let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
-        let blocks = trials.div_ceil(LANES);
-        let mut z = vec![[0.0; LANES]; blocks * size * dim];
-        for place in 0..blocks * LANES {
+        let blocks = trials.div_ceil(BLOCK);
+        let mut z = vec![[0.0; BLOCK]; blocks * size * dim];
+        for place in 0..blocks * BLOCK {
             // Places past the last trial repeat the first of their block, so that they ask for nothing new.
-            let trial = if place < trials { place } else { place / LANES * LANES };
+            let trial = if place < trials { place } else { place / BLOCK * BLOCK };
             let row = batch.position(first + trial, size + 1);
             let (players, attacker) = row.split_at(size * dim);
-            let lanes = &mut z[place / LANES * size * dim..][..size * dim];
-            for (e, (lane, x)) in lanes.iter_mut().zip(players).enumerate() {
-                lane[place % LANES] = x - attacker[e % dim];
+            let numbers = &mut z[place / BLOCK * size * dim..][..size * dim];
+            for (e, (of_trials, x)) in numbers.iter_mut().zip(players).enumerate() {
+                of_trials[place % BLOCK] = x - attacker[e % dim];
             }
         }
         let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who = (0..trials as u32).collect();
-        let far = vec![[0.0; LANES]; blocks];
+        let far = vec![[0.0; BLOCK]; blocks];
         let blocks = Blocks { z, sight, capture, far, sight_step, capture_step, live: trials };
         let mut chunk = Self { policy, batch, first, shape, width, sweep: sweep_of(&shape), blocks, who };
-        for place in 0..chunk.blocks.far.len() * LANES {
+        for place in 0..chunk.blocks.far.len() * BLOCK {
             let scale = divergence::scale(&chunk.state(place), dim);
-            chunk.blocks.far[place / LANES][place % LANES] = divergence::limit(scale);
+            chunk.blocks.far[place / BLOCK][place % BLOCK] = divergence::limit(scale);
         }
         chunk
     }
@@ -135,14 +135,14 @@ impl<'a> Chunk<'a> {
         loop {
             match (self.sweep)(self.width, &self.shape, &mut self.blocks, from, table, next, &mut w.keys) {
                 Stop::End => return,
-                Stop::Over(block, lanes) => {
-                    self.retire(block, lanes, k, ends);
+                Stop::Over(block, members) => {
+                    self.retire(block, members, k, ends);
                     from = block;
                 }
                 Stop::Missing(block) => {
-                    for lane in 0..LANES {
+                    for member in 0..BLOCK {
                         w.words.clear();
-                        w.words.extend(w.keys.iter().map(|word| word[lane]));
+                        w.words.extend(w.keys.iter().map(|word| word[member]));
                         if table.find(&w.words) == 0 {
                             w.missing.push(Topology::from_words(self.shape.rows, self.shape.size, &w.words));
                         }
@@ -161,9 +161,9 @@ impl<'a> Chunk<'a> {
             if self.alone(block, &table, &mut w.keys) {
                 continue;
             }
-            for lane in 0..LANES {
+            for member in 0..BLOCK {
                 w.words.clear();
-                w.words.extend(w.keys.iter().map(|word| word[lane]));
+                w.words.extend(w.keys.iter().map(|word| word[member]));
                 if w.local.find(&w.words) == 0 {
                     let held = table.find(&w.words) as usize;
                     w.local.insert(&w.words, None, table.matrix(held))?;
@@ -178,7 +178,7 @@ impl<'a> Chunk<'a> {
     /// Moves one block, if the table holds all it needs.
     fn alone(&mut self, block: usize, table: &StepTable, keys: &mut Keys) -> bool {
         let live = self.blocks.live;
-        self.blocks.live = live.min((block + 1) * LANES);
+        self.blocks.live = live.min((block + 1) * BLOCK);
         let stop = (self.sweep)(self.width, &self.shape, &mut self.blocks, block, table, None, keys);
         self.blocks.live = live;
         stop == Stop::End
@@ -187,7 +187,7 @@ impl<'a> Chunk<'a> {
     /// The state of the trial in one place, row by row.
     pub(super) fn state(&self, place: usize) -> Vec<f64> {
         let width = self.shape.size * self.shape.dim;
-        self.blocks.z[place / LANES * width..][..width].iter().map(|lane| lane[place % LANES]).collect()
+        self.blocks.z[place / BLOCK * width..][..width].iter().map(|numbers| numbers[place % BLOCK]).collect()
     }
 
     /// How the trial in one place ends at its present state, if it does.
@@ -200,10 +200,10 @@ impl<'a> Chunk<'a> {
     fn ends(&mut self, place: usize, k: usize, end: &mut End) -> bool {
         let last = self.policy.game().grid().steps();
         let far = divergence::reach(&self.state(place), self.shape.dim);
-        let limit = self.blocks.far[place / LANES][place % LANES];
+        let limit = self.blocks.far[place / BLOCK][place % BLOCK];
         if !within(far, limit) {
             end.diverged = true;
-            self.blocks.far[place / LANES][place % LANES] = divergence::LAST;
+            self.blocks.far[place / BLOCK][place % BLOCK] = divergence::LAST;
         }
         // Where the numbers end nobody is caught any more.
         let outcome = if within(far, divergence::LAST) { self.outcome(place) } else { Some(Outcome::Timeout) };
@@ -212,11 +212,11 @@ impl<'a> Chunk<'a> {
         outcome.is_some()
     }
 
-    /// Looks at the trials in `lanes` of a block, and takes those out that are over; the last ones take their places.
-    fn retire(&mut self, block: usize, lanes: u32, k: usize, ends: &mut [End]) {
-        // From the highest lane down, so that a trial that moves in has not been looked at.
-        for lane in (0..LANES).rev().filter(|lane| lanes >> lane & 1 == 1) {
-            let place = block * LANES + lane;
+    /// Looks at the trials in `members` of a block, and takes those out that are over; the last ones take their places.
+    fn retire(&mut self, block: usize, members: u32, k: usize, ends: &mut [End]) {
+        // From the highest member down, so that a trial that moves in has not been looked at.
+        for member in (0..BLOCK).rev().filter(|member| members >> member & 1 == 1) {
+            let place = block * BLOCK + member;
             if !self.ends(place, k, &mut ends[self.who[place] as usize]) {
                 continue;
             }
@@ -236,8 +236,8 @@ impl<'a> Chunk<'a> {
     pub(super) fn fill_up(&mut self) {
         // Places past the last trial repeat the first of their block.
         let live = self.blocks.live;
-        for place in live..live.next_multiple_of(LANES) {
-            self.blocks.copy(&self.shape, live / LANES * LANES, place);
+        for place in live..live.next_multiple_of(BLOCK) {
+            self.blocks.copy(&self.shape, live / BLOCK * BLOCK, place);
         }
     }
 
@@ -249,17 +249,17 @@ impl<'a> Chunk<'a> {
     }
 }
 
-/// Squared reaches of `width` radii a trial in blocks, and the lanes from block to block: none where all share one row.
-fn reaches(radii: &[f64], width: usize, first: usize, trials: usize) -> (Vec<Lane>, usize) {
+/// Squared reaches of `width` radii a trial in blocks, and how many lie from block to block: none where all share one row.
+fn reaches(radii: &[f64], width: usize, first: usize, trials: usize) -> (Vec<PerTrial>, usize) {
     if radii.len() == width {
-        return (radii.iter().map(|&radius| [squared_reach(radius); LANES]).collect(), 0);
+        return (radii.iter().map(|&radius| [squared_reach(radius); BLOCK]).collect(), 0);
     }
-    let mut lanes = vec![[0.0; LANES]; trials.div_ceil(LANES) * width];
-    for place in 0..trials.next_multiple_of(LANES) {
-        let trial = first + if place < trials { place } else { place / LANES * LANES };
+    let mut numbers = vec![[0.0; BLOCK]; trials.div_ceil(BLOCK) * width];
+    for place in 0..trials.next_multiple_of(BLOCK) {
+        let trial = first + if place < trials { place } else { place / BLOCK * BLOCK };
         for (e, &radius) in radii[trial * width..(trial + 1) * width].iter().enumerate() {
-            lanes[place / LANES * width + e][place % LANES] = squared_reach(radius);
+            numbers[place / BLOCK * width + e][place % BLOCK] = squared_reach(radius);
         }
     }
-    (lanes, width)
+    (numbers, width)
 }

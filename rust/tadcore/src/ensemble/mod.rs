@@ -158,7 +158,7 @@ pub fn run_with(
     memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
     let cores = available_parallelism().map_or(1, usize::from);
     let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
-    let threads = threads.min(trials.div_ceil(block::LANES)).max(1);
+    let threads = threads.min(trials.div_ceil(block::BLOCK)).max(1);
     // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
     memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
     play(policy, batch, between, threads, Width::in_use(), &mut ends, cancel)?;
@@ -167,7 +167,7 @@ pub fn run_with(
 
 /// Trials of one chunk at most in a game of N = `size`.
 fn most_trials(size: usize) -> usize {
-    (CHUNK_BYTES / (size_of::<f64>() * size * step_table::padded(size))).clamp(block::LANES, CHUNK)
+    (CHUNK_BYTES / (size_of::<f64>() * size * step_table::padded(size))).clamp(block::BLOCK, CHUNK)
 }
 
 /// Plays checked trials in chunks.
@@ -181,7 +181,7 @@ fn play(
     cancel: &CancelToken,
 ) -> Result<(), RunError> {
     // No thread without a block of trials; equal chunks, as many for each thread.
-    let threads = threads.min(ends.len().div_ceil(block::LANES)).max(1);
+    let threads = threads.min(ends.len().div_ceil(block::BLOCK)).max(1);
     let most = most_trials(policy.game().size());
     let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
     let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
