@@ -178,6 +178,9 @@ class OutOfMemoryError(TadcoreError, MemoryError):
             return f"{asked}, which the system would not give; {_SMALLER}"
         return f"{asked}, more than the limit of {self.limit / 2**30:.1f} GiB; {_SMALLER}"
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.what, self.size, self.limit)  # Dask would call MemoryError's own __new__ otherwise
+
 
 _SMALLER = "fewer defenders, steps or games need less, and so do players that see few others, or all"
 

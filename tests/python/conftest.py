@@ -49,3 +49,11 @@ def runs():
     import tadcore
 
     return {name: tadcore.simulate(tadcore.scenarios.load(name)) for name in tadcore.scenarios.names()}
+
+
+@pytest.fixture(autouse=True)
+def _figures_are_closed():
+    """Close what a test drew with pyplot: Matplotlib keeps every figure, and warns, which fails, from the 21st on."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")

@@ -113,6 +113,7 @@ def test_wildcards_and_the_columns_of_the_table():
     columns += [f"defenders.{i}.capture_radius" for i in range(3)]
     assert set(result.inputs) == set(columns)
     fixed = {"trial": pa.int64(), "kind": pa.int8(), "defender": pa.int32(), "time": pa.float64()}
+    fixed["diverged"] = pa.bool_()
     fixed["outcome"] = pa.dictionary(pa.int32(), pa.string())
     assert {f.name: f.type for f in result.table.schema} == fixed | dict.fromkeys(columns, pa.float64())
     assert not np.array_equal(result.inputs["defenders.0.capture_radius"], result.inputs["defenders.1.capture_radius"])
