@@ -1,10 +1,15 @@
 """How often is the minimum of Θ proved, by what, and what is left? Random games, instants and networks.
 
     python benches/global_minimum.py [--trials 1000] [--starts 1] [--seed 0]
+    python benches/global_minimum.py --visited 20000 [--starts 48] [--seed 0]
 
 For both interactions and n = 1 … 4: weights log-uniform in [0.3, 3], a horizon within the escape time, an instant
 uniform on the grid, a network of uniform density. Trial i of a line depends on (seed, interaction, n, i) alone.
 Needs the extra ``bounds``. The output is quoted in docs/theory/global.md.
+
+With ``--visited``: pairs that games pass through, of n = 2 … 5 with weights and γ log-uniform in [0.1, 10] (γ divided
+by its largest entry), every network of a game at one instant at which the game was in it; certified pairs too. Each is
+searched by the independent descents of ``wide_search.py``, from as many starts as asked for. Needs Numba.
 """
 
 from __future__ import annotations
@@ -105,14 +110,100 @@ def line(interaction: str, n: int, trials: int, starts: int, seed: int) -> tuple
     return counts, gaps, 1e3 * spent / trials
 
 
+def played(rng: np.random.Generator) -> tadcore.Run | None:
+    """A random game played to its end; None where it has no equilibrium even on a shorter horizon."""
+    interaction, n = ("I1", "I2")[int(rng.integers(2))], int(rng.integers(2, 6))
+    first = interaction == "I1"
+
+    def weight() -> float:
+        return float(10.0 ** rng.uniform(-1.0, 1.0))
+
+    def sight() -> float:
+        return float("inf") if rng.random() < 0.15 else float(rng.uniform(0.4, 5.0))
+
+    own = ("running_weight", "terminal_weight") if first else ()
+    both = ("evasion_running_weight", "evasion_terminal_weight")
+    gamma = np.array([weight() for _ in range(4 if first else 3)])
+    positions = rng.uniform(-3.0, 3.0, (n + 2, 3 if rng.random() < 0.15 else 2)).tolist()
+    horizon, steps = float(np.exp(rng.uniform(np.log(0.5), np.log(6.0)))), int(rng.choice([40, 100]))
+    data = {
+        "interaction": interaction,
+        "horizon": horizon,
+        "step": horizon / steps,
+        "synthesis_weights": (gamma / gamma.max()).tolist(),
+        "attacker": {
+            "position": positions[-1],
+            "capture_radius": 0.1,
+            **{k: weight() for k in ("control_weight", "target_running_weight", "target_terminal_weight")},
+        }
+        | ({"evasion": float(rng.choice([0.0, 0.5, 1.0]))} if first else {}),
+        "target": {"position": positions[-2], **{k: weight() for k in ("control_weight", *own)}}
+        | ({} if first else {"visibility_radius": sight()}),
+        "defenders": [
+            {"position": positions[i], "capture_radius": 0.05, "visibility_radius": sight()}
+            | {k: weight() for k in ("control_weight", *own, *both)}
+            for i in range(n)
+        ],
+    }
+    sc = tadcore.Scenario.model_validate(data)
+    try:
+        return tadcore.simulate(sc)
+    except tadcore.NoEquilibriumError as error:
+        if not error.escape_time > 1e-3:
+            return None
+        horizon = 0.95 * error.escape_time
+        return tadcore.simulate(sc.replace(horizon=horizon, step=horizon / steps))
+
+
+def visited(pairs: int, starts: int, seed: int) -> None:
+    """Print how many of the pairs that random games pass through the independent search beats."""
+    from wide_search import LOWER as BEATEN, Pair
+
+    counts: Counter[str] = Counter()
+    game = 0
+    while counts["pairs"] < pairs:
+        rng = np.random.Generator(np.random.Philox(key=[seed, game]))
+        game += 1
+        run = played(rng)
+        if run is None:
+            continue
+        sc, instants = run.scenario, {}
+        for k, network in enumerate(run.adjacency):
+            instants.setdefault(network.tobytes(), []).append(k)
+        P = list(tadcore.solve_equilibrium(sc).P.values())
+        for which in list(instants.values())[: pairs - counts["pairs"]]:
+            k = int(rng.choice(which))
+            network = run.adjacency[k]
+            found = tadcore.synthesize(sc, step=k, adjacency=network)
+            pair = Pair(sc, np.array([p[k] for p in P]), network)
+            best, _ = pair.lowest(found.rows, starts, rng)
+            beaten = best < found.theta * (1.0 - BEATEN) - 1e-13 * pair.scale
+            counts["pairs"] += 1
+            counts["certified"] += found.certified
+            counts["not converged"] += not found.converged
+            counts["Newton steps"] += found.iterations
+            counts["beaten"] += beaten
+            counts["certified, beaten"] += beaten and found.certified
+            if beaten:
+                gamma = ", ".join(f"{g:.3f}" for g in sc.synthesis_weights)
+                by = 1.0 - best / found.theta
+                print(f"game {game - 1}: {sc.interaction} n={sc.n} k={k} γ=({gamma}) lower by {by:.2e}", flush=True)
+    for name, count in counts.items():
+        print(f"{name:40}{count:10}")
+    print(f"{'beaten, of 20,000':40}{20_000 * counts['beaten'] / counts['pairs']:10.1f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=1000, help="pairs for each interaction and n")
-    parser.add_argument(
-        "--starts", type=int, default=1, help="random starts in scalar gains and in full blocks for each pair"
-    )
+    parser.add_argument("--visited", type=int, help="pairs that games pass through, instead of random ones")
+    parser.add_argument("--starts", type=int, help="starts of the other searches for each pair (1; visited: 48)")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
+    if args.visited is not None:
+        visited(args.visited, args.starts or 48, args.seed)
+        return
+    args.starts = 1 if args.starts is None else args.starts
     columns = {
         "first": "certified by the first descent",
         "certified": "certified",

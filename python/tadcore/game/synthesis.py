@@ -8,6 +8,10 @@ over what the network lets player i use, g_i = K_i 𝓘_i (eq:nwadapt), each K_i
 
 Norms are Frobenius norms of the reduced factors. The paper's matrices are these ⊗ I, so its Θ is dim times the one
 reported here; among scalars the minimiser is the same. `Gains.certified` tells where it is proved to be global.
+
+A common factor of γ changes Θ alone: the gains are bitwise the same for γ and 2^k γ. Without weight on S (γ₄ = 0 in
+I1, γ₂ or γ₃ = 0 in I2) equal minima may differ, by the sign of a row at the least; the gains are then the limit of a
+small weight, the minimum nearest to the equilibrium.
 """
 
 from __future__ import annotations
@@ -50,7 +54,8 @@ class Gains:
     terms : dict of str to float
         The squared norms that Θ weighs, unweighted: dQ_d, dQ_tau, dQ_a, S1 or dQ, S2, S3.
     weights : dict of str to float
-        γ under the same names; ``theta`` is the sum of ``weights[t] * terms[t]``.
+        γ under the same names; ``theta`` is the sum of ``weights[t] * terms[t]``. Where S (or S2, S3) has weight 0, the
+        gains are the limit of a small weight: of equal minima the one nearest to the equilibrium.
     iterations : int
         Steps of the solver.
     converged : bool

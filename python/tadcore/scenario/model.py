@@ -275,6 +275,12 @@ class Scenario(CheckedModel):
         ]
         if self.interaction == "I1":
             lines[0] += f" (λ = {self.attacker.evasion:g})"
+        gamma = self.synthesis_weights
+        if len(set(gamma)) > 1:
+            lines.append(f"γ = ({', '.join(f'{g:g}' for g in gamma)})")
+        first = 3 if self.interaction == "I1" else 1
+        if missing := [f"γ{i + 1}" for i in range(first, len(gamma)) if gamma[i] == 0.0]:
+            lines.append(f"{' = '.join(missing)} = 0: the gains are the limit of a small weight on S")
         sight = dict(zip(self.constrained, self.visibility_radii, strict=True))
         capture = dict(zip([*self.players[: self.n], "attacker"], self.capture_radii, strict=True))
         for label, position in zip(self.players, self.positions, strict=True):

@@ -196,7 +196,7 @@ impl Synthesizer {
                 index,
                 Gains {
                     rows: candidate.g,
-                    theta: candidate.reached.value,
+                    theta: problem.in_scale_of_gamma(candidate.reached.value),
                     gradient_norm: candidate.reached.gradient_norm,
                     iterations: candidate.iterations,
                     status: candidate.reached.status,

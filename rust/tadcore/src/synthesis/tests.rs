@@ -7,8 +7,10 @@ use crate::game::Interaction;
 use crate::simd::Width;
 
 mod descents;
+mod moves;
 mod single;
 mod starts;
+mod weights;
 
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {
     let width = objective.width();
@@ -200,7 +202,7 @@ fn the_value_is_the_weighted_sum_of_the_terms() {
         let g = &g[..g.len() / 2];
         let value = RealGains::<f64, 0>::new(&problem.theta.double, None).expect("memory").value(g);
         let sum = problem.weigh(&problem.terms(&p, g, &CancelToken::new()).expect("memory"));
-        assert!((sum - value).abs() < 1e-12 * value);
+        assert!((sum - problem.in_scale_of_gamma(value)).abs() < 1e-12 * sum);
     }
 }
 
@@ -239,7 +241,7 @@ fn by_definition(problem: &Problem, g: &[f64], complex: bool) -> f64 {
                     x.1 + problem.theta.double.r[i] * if complex { term.1 } else { 0.0 },
                 );
             }
-            sum += problem.gamma[0] * square(x);
+            sum += problem.theta.double.first * square(x);
         }
     }
     let delta = |i: usize, q: usize| (a[i * n + q] - problem.theta.double.fne[i * n + q], b[i * n + q]);
@@ -307,7 +309,7 @@ fn sizes_bound_the_parts_that_cancel() {
                     .map(|e| {
                         let (i, b) = (e / n, e % n);
                         let row: f64 = (0..n).map(|a| g[i * n + a] * problem.theta.double.target[a * n + b]).sum();
-                        (4.0 * problem.gamma[0] * problem.theta.double.r[i] * row).powi(2)
+                        (4.0 * problem.theta.double.first * problem.theta.double.r[i] * row).powi(2)
                     })
                     .sum();
                 assert!(rgm.sqrt() <= scale, "{interaction:?} {term} {size}");

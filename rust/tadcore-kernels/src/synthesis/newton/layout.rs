@@ -145,6 +145,20 @@ impl<T: Number> Layout<T> {
         self.slots[slot].active
     }
 
+    /// The diagonal of a quadratic form restricted to the variables.
+    #[inline(always)]
+    pub fn diagonal(&self, form: &impl Form<T>, g: &[T], row: &mut [T], out: &mut [T]) {
+        for (v, out) in self.slots[..self.used].iter().zip(out) {
+            let x = if let (Some(x), Some(own)) = (form.entry(g, v, v.entry), form.entry(g, v, v.own)) {
+                x.minus(v.relative, own)
+            } else {
+                form.row(g, v, row);
+                row[v.entry].minus(v.relative, row[v.own])
+            };
+            *out = if T::LANES > 1 { T::select(v.active, x, T::splat(0.0)) } else { x };
+        }
+    }
+
     /// The largest diagonal entry of a restricted form.
     #[inline(always)]
     pub fn largest(&self, form: &[T]) -> T {

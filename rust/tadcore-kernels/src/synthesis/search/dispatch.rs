@@ -9,8 +9,10 @@ use std::any::Any;
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
 use crate::simd::{Number, Width, dispatch, widened};
-use crate::synthesis::newton::{Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, minimise, unknowns};
-use crate::synthesis::theta::{Certificate, Coefficients, Doubled, Precisions, RealGains};
+use crate::synthesis::newton::{
+    Backend, Limits, Objective, Owner, Tasks, Workspace, factorise, forward, minimise, packed, unknowns,
+};
+use crate::synthesis::theta::{Certificate, Coefficients, Doubled, Parts, Precisions, RealGains};
 
 /// N up to which there is a version with constant loop bounds.
 pub const CONSTANT_UP_TO: usize = 8;
@@ -18,8 +20,10 @@ pub const CONSTANT_UP_TO: usize = 8;
 pub const SIDE_BY_SIDE_UP_TO: usize = 6;
 /// Descents from which they go side by side.
 const SIDE_BY_SIDE_FROM: usize = 2;
-/// How far below zero, relative to its largest diagonal entry, rounding may push the certificate's form.
+/// How far below zero rounding may push the certificate's form where its parts are scaled to one, variable by variable.
 const CERTIFICATE_ROUNDING: f64 = 1e-12;
+/// What a certified minimum may leave to be gained: a part of Θ, and a part of what cancels in it.
+const LEFT: (f64, f64) = (1e-10, 1e-15);
 
 /// In which gains a list descends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -277,12 +281,26 @@ fn certify<T: Number, const N: usize>(
             }
         }
         w.layout.list();
-        real.value(&w.g[..width]);
+        let value = real.value(&w.g[..width]);
+        real.gradient(&w.g[..width], &mut w.slope[..width]);
+        let (d, used, zero, one) = (w.layout.len(), w.layout.used(), T::splat(0.0), T::splat(1.0));
+        w.layout.restrict(&w.slope[..width], &mut w.gradient[..d]);
         w.layout.restrict_form(&Certificate(real), &w.g, &mut w.row, &mut w.hessian, backend.cancel);
-        let largest = w.layout.largest(&w.hessian);
-        let allowance = T::splat(CERTIFICATE_ROUNDING) * largest;
-        let (definite, _) = factorise(&w.hessian, allowance, &w.layout, backend, &mut w.factor);
-        let proved = T::bits(definite) | T::bits(largest.at_most(T::splat(0.0)));
+        real.measure();
+        w.layout.diagonal(&Parts(real), &w.g, &mut w.row, &mut w.other);
+        for i in 0..used {
+            let parts = w.other[i];
+            let scale = one / T::select(zero.less(parts), parts, one).sqrt();
+            w.other[i] = scale;
+            w.gradient[i] = w.gradient[i] * scale;
+            for (x, &other) in w.hessian[packed(i)..].iter_mut().zip(&w.other[..i + 1]) {
+                *x = *x * (scale * other);
+            }
+        }
+        let (definite, _) = factorise(&w.hessian, T::splat(CERTIFICATE_ROUNDING), &w.layout, backend, &mut w.factor);
+        let left = T::splat(0.5) * forward(&w.factor, d, &mut w.gradient[..d]);
+        let allowed = T::splat(LEFT.0) * value + T::splat(LEFT.1 * real.value_scale());
+        let proved = T::bits(definite) & T::bits(left.at_most(allowed));
         for task in first..last {
             if proved >> (task - first) & 1 == 1 {
                 tasks.certify(task);

@@ -6,4 +6,4 @@ mod real;
 
 pub use coefficients::{Coefficients, Precisions, Scale, TABULATED_UP_TO};
 pub use doubled::Doubled;
-pub use real::{Certificate, RealGains};
+pub use real::{Certificate, Parts, RealGains};

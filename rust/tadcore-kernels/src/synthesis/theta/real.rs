@@ -10,7 +10,8 @@
 //! **A certificate of global optimality.** ‖X‖² ≥ ‖X*‖² + 2⟨X*, X − X*⟩ and the rest of Θ is quadratic, so at a critical
 //! point G* the quadratic form with blocks 4γ₁δ_ij r_i X* + Q_ij bounds Θ − Θ* from below by half its value. Where that
 //! form is positive semidefinite on the variables, G* is a *global* minimiser. It is the Hessian without its
-//! Gauss–Newton part: one more factorisation proves what no number of restarts can.
+//! Gauss–Newton part: one more factorisation proves what no number of restarts can. A gradient ∇Θ that is not quite zero
+//! leaves ½∇Θᵀ(form)⁻¹∇Θ to be gained at most.
 
 use super::coefficients::{Coefficients, TABULATED_UP_TO};
 use crate::cancel::{CancelToken, raised};
@@ -54,6 +55,17 @@ impl<'a, T: Number, const N: usize> RealGains<'a, T, N> {
     #[inline(always)]
     fn dimensions(&self) -> (usize, usize) {
         (if N > 0 { N } else { self.problem.size }, self.problem.rows)
+    }
+
+    /// Puts the sizes of the parts of X at the point last evaluated, its diagonal alone, in the place of the X kept.
+    #[inline(always)]
+    pub fn measure(&mut self) {
+        let (n, _) = self.dimensions();
+        self.kept.fill(T::splat(0.0));
+        for a in 0..n {
+            let at = a * n + a;
+            self.kept[at] = self.x[at].abs() + T::splat(2.0) * T::all(self.problem.target[at]);
+        }
     }
 
     /// The product of a direction in row i with the Hessian, X being `x`, or with the certificate's form: the Hessian
@@ -261,6 +273,22 @@ impl<T: Number, const N: usize> Form<T> for Certificate<'_, '_, T, N> {
     #[inline(always)]
     fn entry(&self, g: &[T], v: &Slot<T>, at: usize) -> Option<T> {
         self.0.product_entry::<false>(&self.0.x, g, v, at)
+    }
+}
+
+/// Sizes of the parts that cancel in the certificate's form, after [`RealGains::measure`]: its diagonal is what the
+/// rounding of each variable's entries is relative to.
+pub struct Parts<'a, 'b, T: Number, const N: usize>(pub &'a RealGains<'b, T, N>);
+
+impl<T: Number, const N: usize> Form<T> for Parts<'_, '_, T, N> {
+    #[inline(always)]
+    fn row(&self, g: &[T], v: &Slot<T>, out: &mut [T]) {
+        self.0.product::<false>(&self.0.kept, g, v, out);
+    }
+
+    #[inline(always)]
+    fn entry(&self, g: &[T], v: &Slot<T>, at: usize) -> Option<T> {
+        self.0.product_entry::<false>(&self.0.kept, g, v, at)
     }
 }
 

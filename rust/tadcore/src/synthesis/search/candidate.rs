@@ -22,7 +22,7 @@ pub enum Start {
 /// small makes no other points of A + B and A − B.
 pub(crate) const BACK: f64 = 1e-3;
 /// How much lower, relatively, a restart must lead to win.
-const TIE: f64 = 1e-9;
+pub(crate) const TIE: f64 = 1e-9;
 
 /// One network at the instant: its variables, and the best gains found so far.
 #[derive(Debug)]

@@ -5,10 +5,11 @@
 //!    random networks, about four in five at n = 3 and three in five at n = 5).
 //! 2. Otherwise two restarts: a descent in complex gains and one in stacked gains, both from the canonical start with a
 //!    fixed pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes
-//!    back to the real gains A, A + B and A − B, from where Newton finishes; so it does from the canonical start
-//!    without one row at a time.
-//! 3. Further restarts: Newton from the best point with one row or two rows reversed, again while that goes lower: GᵀRG
-//!    does not see the sign of a row, so minima come in families that differ by signs.
+//!    back to the real gains A, A + B and A − B, from where Newton finishes. (Of more than eight players, also from the
+//!    canonical start without one row at a time.)
+//! 3. Further restarts: Newton from the best point with rows and gains reversed, and rows exchanged, again while that goes
+//!    lower: GᵀRG sees neither the sign of a row of √R·G nor whose it is, so minima come in families (`moves`).
+//! 4. Without weight on S minima need not be unique: which of equal ones is taken (`settle`).
 //!
 //! Most restarts lead back to the best point or to a higher one. Where descents go side by side they are made in single
 //! precision first, twice as many to a register, and what that leaves undecided goes on in double from there; doubled
@@ -17,7 +18,8 @@
 //! The lowest Θ is kept; a restart must win by more than rounding, so ties go to the earliest. The networks of one
 //! instant go through these stages together, their descents side by side; the incumbent that lets a descent end early
 //! is the best point before its stage, so no network's answer depends on which others were asked for. Everything here
-//! is a function of (t_k, topology) alone. How often each stage is needed: `docs/decisions/0003-synthesis.md`.
+//! is a function of (t_k, topology) alone. How often each stage is needed: `docs/decisions/0003-synthesis.md`
+//! and `0013-exchanged-rows.md`.
 //!
 //! In this order, each file using those above it:
 //!
@@ -27,10 +29,14 @@
 //! | `candidate` | a network that is being solved, and the best gains found so far |
 //! | `dispatch` | a list of descents made as wide as the processor allows |
 //! | `gradient` | the paper's gradient descent, as a second method |
+//! | `moves` | restarts from the best point: rows and gains reversed, rows exchanged |
 //! | `stages` | the stages above |
+//! | `settle` | which of equal minima is taken where S has no weight |
 
 mod candidate;
 mod gradient;
+mod moves;
+mod settle;
 mod stages;
 mod start;
 
@@ -40,6 +46,8 @@ pub use candidate::Start;
 pub(crate) use dispatch::Kind;
 pub(crate) use dispatch::{Dispatcher, SIDE_BY_SIDE_UP_TO};
 pub(crate) use gradient::descend;
+#[cfg(test)]
+pub(crate) use moves::Moves;
 #[cfg(test)]
 pub(crate) use stages::{BASIN, DOUBLED_ITERATIONS, LONGEST_STEP, far_start};
 pub(crate) use stages::{Search, admit};

@@ -2,6 +2,7 @@
 
 use super::candidate::{BACK, Candidate, Start};
 use super::dispatch::{self, Dispatcher, Kind};
+use super::moves::{CHANGE_UP_TO, Moves};
 use crate::error::{NoMemory, Stopped};
 use crate::memory;
 use crate::simd::norm;
@@ -19,9 +20,7 @@ pub(crate) const DOUBLED_ITERATIONS: usize = 300;
 /// Steps of a descent in single precision, and the relative gradient at which it is left undecided.
 const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
-/// Constrained players up to which pairs of rows are reversed too; beyond, one row at a time.
-const PAIRS_UP_TO: usize = 8;
-/// Rounds of reversals, each from the best point of the one before.
+/// Rounds of moves, each from the best point of the one before.
 const ROUNDS: usize = 4;
 /// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
 /// of them mean a narrow valley, whose floor is worth following to its end.
@@ -67,7 +66,8 @@ impl Search<'_> {
         if !open.is_empty() {
             self.restart(candidates, &open)?;
         }
-        self.polish(candidates)
+        self.polish(candidates)?;
+        self.settle(candidates)
     }
 
     /// The first descent of the candidates that are `complete`, or of the others.
@@ -95,7 +95,11 @@ impl Search<'_> {
         for _ in 0..ROUNDS {
             self.begin(1);
             for &e in &lower {
-                self.reverse(e, &candidates[e].g)?;
+                let tasks = &mut *self.tasks;
+                Moves::new(self.problem, &candidates[e]).list(|g| {
+                    tasks.add(e, false, 0.0)?.copy_from_slice(g);
+                    Ok(())
+                })?;
             }
             let starts = vec![Start::Reversed; self.tasks.len()];
             lower = self.finish(candidates, starts)?;
@@ -133,7 +137,7 @@ impl Search<'_> {
     }
 
     /// Empties the list for points of as many copies of the gains.
-    fn begin(&mut self, copies: usize) {
+    pub(super) fn begin(&mut self, copies: usize) {
         self.tasks.clear(self.problem.rows * self.problem.size, copies);
     }
 
@@ -184,7 +188,7 @@ impl Search<'_> {
                 balance(point, &candidates[e].variables);
                 starts.push(start);
             }
-            if start == Start::Stacked {
+            if start == Start::Stacked && m > CHANGE_UP_TO {
                 for i in 0..m {
                     scale_rows(n, &candidates[e].initial, &[i], 0.0, self.tasks.add(e, false, 0.0)?);
                     starts.push(Start::Reversed);
@@ -242,21 +246,6 @@ impl Search<'_> {
             }
         }
         Ok(lower)
-    }
-
-    /// Lists the point `g` of a candidate with one row or two rows reversed.
-    fn reverse(&mut self, e: usize, g: &[f64]) -> Result<(), Stopped> {
-        let (n, m) = (self.problem.size, self.problem.rows);
-        let used: Vec<usize> = (0..m).filter(|&i| g[i * n..(i + 1) * n].iter().any(|&x| x != 0.0)).collect();
-        for (k, &i) in used.iter().enumerate() {
-            scale_rows(n, g, &[i], -1.0, self.tasks.add(e, false, 0.0)?);
-            if m <= PAIRS_UP_TO {
-                for &j in &used[k + 1..] {
-                    scale_rows(n, g, &[i, j], -1.0, self.tasks.add(e, false, 0.0)?);
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Tries the certificate at the best point of each of `which`.

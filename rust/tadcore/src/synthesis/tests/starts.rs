@@ -45,7 +45,8 @@ fn the_look_that_won_is_the_one_that_leads_there() {
     for key in 0..1u64 << (m * n) {
         let topology = Topology::from_key(m, n, key);
         let found = Synthesizer::new().solve(&problem, &topology, Options::default()).expect("memory");
-        let reaches = |complex| alone(&problem, &topology, complex) <= found.theta * (1.0 + 1e-8);
+        let reaches =
+            |complex| problem.in_scale_of_gamma(alone(&problem, &topology, complex)) <= found.theta * (1.0 + 1e-8);
         match found.start {
             Start::Complex => assert!(reaches(true), "{topology:?}"),
             Start::Stacked => assert!(reaches(false) && !reaches(true), "{topology:?}"),

@@ -10,6 +10,9 @@
 //! With Δ = G − F every residual of the paper reads (reduced; a block norm is `dim` times as large):
 //! S = RΔ (S₁, or S₂ and S₃ stacked), ±ΔQ = GᵀRG − M, ΔQ_p = −(P_pB_dΔ + ·ᵀ), so that
 //! Θ = γ₁‖GᵀRG − M‖² + Σ_p‖W_pΔ + (W_pΔ)ᵀ‖² + Σ_i c_i‖Δ_i‖², c_i = γ r_i² (eq:errfun1, eq:errfun2).
+//!
+//! γ is divided by the power of two that brings its largest entry into [1, 2): the search and its gains are bitwise the
+//! same for γ and 2^k γ, and nothing underflows. Θ is reported in the scale of γ as given.
 
 use super::{Coefficients, Precisions, Scale, TABULATED_UP_TO};
 use crate::cancel::CancelToken;
@@ -18,6 +21,9 @@ use crate::game::{Game, Interaction};
 use crate::memory::{copy, zeros};
 use crate::simd::{norm, sum_of_squares};
 
+/// A term of Θ this small beside the others is lost in their rounding.
+const LOST: f64 = 1e-15;
+
 /// Everything Θ needs to know of one instant t_k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
@@ -25,6 +31,8 @@ pub struct Problem {
     pub(crate) size: usize,
     pub(crate) rows: usize,
     pub(crate) gamma: Vec<f64>,
+    /// γ is 2^`exponent` times what `theta` is made with.
+    exponent: i32,
     /// What Θ is made of.
     pub(crate) theta: Precisions,
 }
@@ -73,9 +81,11 @@ impl Problem {
                 }
             }
         }
+        let exponent = exponent(gamma.iter().fold(0.0, |a: f64, &b| a.max(b)));
+        let scaled: Vec<f64> = gamma.iter().map(|&g| times_power(g, -exponent)).collect();
         let mut coupling: Vec<Vec<f64>> = Vec::new();
-        for group in (1..groups).filter(|&p| gamma[p] > 0.0) {
-            let scale = gamma[group].sqrt();
+        for group in (1..groups).filter(|&p| scaled[p] > 0.0) {
+            let scale = scaled[group].sqrt();
             let mut w = copy(WHAT, &p[group * size * size..][..rows * size])?;
             w.iter_mut().for_each(|x| *x *= scale);
             coupling.push(w);
@@ -95,7 +105,7 @@ impl Problem {
                     Interaction::I1 => 3,
                     Interaction::I2 => 1 + usize::from(i + 1 == rows),
                 };
-                gamma[term] * r[i] * r[i]
+                scaled[term] * r[i] * r[i]
             })
             .collect();
         let quadratic = [1.0, -1.0].map(|sign| {
@@ -110,14 +120,57 @@ impl Problem {
             target: size_of_m,
             coupling: of_w,
             closeness: of_c,
-            quartic: 4.0 * gamma[0] * largest(&r),
-            value: gamma[0] * size_of_m * size_of_m + (4.0 * of_w + of_c) * size_of_f * size_of_f,
+            quartic: 4.0 * scaled[0] * largest(&r),
+            value: scaled[0] * size_of_m * size_of_m + (4.0 * of_w + of_c) * size_of_f * size_of_f,
         };
-        let strength = r.iter().map(|r| 4.0 * gamma[0] * r).collect();
-        let first = gamma[0];
+        let strength = r.iter().map(|r| 4.0 * scaled[0] * r).collect();
+        let first = scaled[0];
         let double =
             Coefficients { size, rows, first, strength, r, fne, target, coupling, gram, closeness, quadratic, scale };
-        Ok(Self { interaction, size, rows, gamma, theta: double.into() })
+        Ok(Self { interaction, size, rows, gamma, exponent, theta: double.into() })
+    }
+
+    /// A value of `theta` in the scale of γ.
+    pub(crate) fn in_scale_of_gamma(&self, value: f64) -> f64 {
+        times_power(value, self.exponent)
+    }
+
+    /// The players whose ‖S_i‖² has no weight, or one lost in the rounding of Θ.
+    pub(crate) fn unweighted(&self) -> Vec<usize> {
+        let of = &self.theta.double;
+        let (lost, all) = (LOST * of.scale.value, self.feedback(0..self.rows));
+        let small = |i: usize| of.closeness[i] / (of.r[i] * of.r[i]) * all <= lost;
+        (0..self.rows).filter(|&i| lost > 0.0 && small(i)).collect()
+    }
+
+    /// Θ with a weight on ‖S_i‖² of those players: what it is of Θ's parts, all of them together.
+    pub(crate) fn weighted(&self, players: &[usize], weight: f64) -> Precisions {
+        let (mut of, n) = (self.theta.double.clone(), self.size);
+        let all = self.feedback(players.iter().copied());
+        let common = if all > 0.0 { weight * of.scale.value / all } else { 0.0 };
+        for &i in players {
+            let more = common * of.r[i] * of.r[i];
+            of.closeness[i] += more;
+            for entry in i * n..(i + 1) * n {
+                of.quadratic
+                    .iter_mut()
+                    .filter(|q| !q.is_empty())
+                    .for_each(|q| q[entry * self.rows * n + entry] += 2.0 * more);
+            }
+            of.scale.closeness = of.scale.closeness.max(of.closeness[i]);
+        }
+        Precisions { double: of, single: None }
+    }
+
+    /// Σ r_i²‖F_i‖² over some players.
+    fn feedback(&self, players: impl IntoIterator<Item = usize>) -> f64 {
+        let (n, of) = (self.size, &self.theta.double);
+        players.into_iter().map(|i| of.r[i] * of.r[i] * sum_of_squares(&of.fne[i * n..(i + 1) * n])).sum()
+    }
+
+    /// Whether Θ is even in row i of those: its sign changes nothing.
+    pub(crate) fn even(&self) -> bool {
+        self.theta.double.coupling.is_empty()
     }
 
     /// N.
@@ -193,6 +246,21 @@ fn multiply(
 
 /// What asks for memory here.
 const WHAT: &str = "the synthesis problem of one instant";
+
+/// e of the power of two with 2^e ≤ x < 2^(e + 1); 0 for x = 0.
+fn exponent(x: f64) -> i32 {
+    let of_normal = |x: f64| (x.to_bits() >> 52 & 0x7ff) as i32 - 1023;
+    match x {
+        0.0 => 0,
+        _ if x < f64::MIN_POSITIVE => of_normal(x * 2f64.powi(64)) - 64,
+        _ => of_normal(x),
+    }
+}
+
+/// x · 2^e in two steps, of which none overflows where the product does not.
+fn times_power(x: f64, e: i32) -> f64 {
+    x * 2f64.powi(e / 2) * 2f64.powi(e - e / 2)
+}
 
 /// The constant part of the Hessian, by the sign of its second term.
 fn constant(n: usize, sign: f64, coupling: &[Vec<f64>], gram: &[f64], closeness: &[f64]) -> Vec<f64> {
