@@ -198,34 +198,45 @@ fn symmetrise(n: usize, a: &mut [f64]) {
     }
 }
 
-/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch. Once `cancel` is raised P is left unfinished.
+/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch, and so are `z_row` and `g_row`, n long: a row that is summed up
+/// stays in registers where n is a constant. Once `cancel` is raised P is left unfinished.
 #[inline(always)]
-fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64], cancel: Option<&CancelToken>) {
+fn advance(
+    n: usize,
+    level: &Level,
+    p: &mut [f64],
+    (z, g): (&mut [f64], &mut [f64]),
+    (z_row, g_row): (&mut [f64], &mut [f64]),
+    cancel: Option<&CancelToken>,
+) {
     let (c, e, f) = (&level.c[..n * n], &level.e[..n * n], &level.f[..n * n]);
     let (p, z, g) = (&mut p[..n * n], &mut z[..n * n], &mut g[..n * n]);
+    let (z_row, g_row) = (&mut z_row[..n], &mut g_row[..n]);
     // Zᵀ = Cᵀ + P E in `z`; then Gᵀ = F + P C − Zᵀ P in `g`, so that the increment solves Xᵀ (ΔP)ᵀ = Gᵀ.
     for i in 0..n {
         if raised(cancel) {
             return;
         }
         for j in 0..n {
-            z[i * n + j] = c[j * n + i];
-            g[i * n + j] = f[i * n + j];
+            z_row[j] = c[j * n + i];
+            g_row[j] = f[i * n + j];
         }
         for k in 0..n {
             let left = p[i * n + k];
             for j in 0..n {
-                z[i * n + j] += left * e[k * n + j];
-                g[i * n + j] += left * c[k * n + j];
+                z_row[j] += left * e[k * n + j];
+                g_row[j] += left * c[k * n + j];
             }
         }
         for k in 0..n {
-            let left = z[i * n + k];
+            let left = z_row[k];
             for j in 0..n {
-                g[i * n + j] -= left * p[k * n + j];
+                g_row[j] -= left * p[k * n + j];
             }
         }
-        z[i * n + i] += 1.0;
+        z_row[i] += 1.0;
+        z[i * n..][..n].copy_from_slice(z_row);
+        g[i * n..][..n].copy_from_slice(g_row);
     }
     // Elimination without pivoting: ‖Z‖₁ ≤ ½.
     for k in 0..n {
@@ -276,7 +287,7 @@ fn advance(n: usize, level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64],
 widened! {
     #[inline(never)]
     fn advance_small<V, const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
-        advance(N, level, p, z, g, None);
+        advance(N, level, p, (z, g), (&mut [0.0; N], &mut [0.0; N]), None);
     }
 }
 
@@ -290,7 +301,8 @@ widened! {
         g: &mut [f64],
         cancel: Option<&CancelToken>,
     ) {
-        advance(n, level, p, z, g, cancel);
+        let ((z, z_row), (g, g_row)) = (z.split_at_mut(n * n), g.split_at_mut(n * n));
+        advance(n, level, p, (z, g), (z_row, g_row), cancel);
     }
 }
 
@@ -304,7 +316,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
     for (i, f) in game.state_weights(true)[0].iter().enumerate() {
         p[i * n + i] = f * flow.balance[i] * flow.balance[i];
     }
-    let (mut z, mut g) = (zeros(WHAT, n * n)?, zeros(WHAT, n * n)?);
+    let (mut z, mut g) = (zeros(WHAT, n * n + n)?, zeros(WHAT, n * n + n)?); // matrices, and a row each
     let (mut taken, mut j) = (0, 0_usize);
     write(&flow, &p, &mut nodes[steps * n * n..]);
     for k in 1..=steps {
