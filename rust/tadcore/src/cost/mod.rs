@@ -3,7 +3,7 @@
 //! J = ½‖z(t_end)‖²_F + ½∫(‖z‖²_Q ± ‖u‖²_R)dt with the terminal weight at the time of termination. Between instants
 //! z(t_k + s) = exp(Cs)z(t_k) is expanded in its Taylor series, so the integrand is a polynomial to rounding and
 //! Gauss–Legendre quadrature of matching order integrates it exactly; a step with ‖C‖δ > ½ is cut into pieces first.
-//! Where that would take more than some pieces, ½ z(t_k)ᵀ W z(t_k) takes their place, W the [`gramian`] of the step.
+//! Where that would take more than some pieces, ½ z(t_k)ᵀ W z(t_k) takes their place, W the Gramian of the step.
 //!
 //! Costs carry all axes: they are the paper's own J, not a reduced factor.
 

@@ -43,6 +43,8 @@ use transitions::Transitions;
 pub struct StepPolicy {
     /// The gains of the constrained players, and how they were found.
     pub gains: Gains,
+    /// The squared residual norms of Θ, unweighted, in the order of γ.
+    pub terms: Vec<f64>,
     /// exp(Cδ), N × N row-major.
     pub transition: Vec<f64>,
     /// The attacker's displacement over the step is this row times z.
@@ -51,7 +53,8 @@ pub struct StepPolicy {
 
 impl StepPolicy {
     fn bytes(&self) -> usize {
-        size_of::<Self>() + size_of::<f64>() * (self.gains.rows.len() + self.transition.len() + self.attacker.len())
+        let numbers = [&self.gains.rows, &self.terms, &self.transition, &self.attacker];
+        size_of::<Self>() + numbers.iter().map(|list| size_of_val(list.as_slice())).sum::<usize>()
     }
 }
 
@@ -199,17 +202,21 @@ impl Policy {
         let (canonical, order) = self.classes.canonical(topology);
         let n = self.game.size();
         solver.watch(cancel);
-        let gains = solver.solve(&self.problem(step, cancel)?, &canonical, Options::default())?;
+        let problem = self.problem(step, cancel)?;
+        let gains = solver.solve(&problem, &canonical, Options::default())?;
         let free = self.free_rows(step);
         let mut c = zeros(exponential::WHAT, n * n)?;
         closed_loop::matrix(&free, &gains.rows, &mut c);
+        let rows = symmetry::back(&order, &gains.rows)?;
+        let terms = problem.terms(self.equilibrium.node(step), &rows, cancel)?;
         let (mut transition, mut attacker) = (zeros(exponential::WHAT, n * n)?, vec![0.0; n]);
         let step = self.game.grid().step();
         exponential::exponential(&c, &free.attacker, step, &mut transition, &mut attacker, cancel)?;
         let mut own = vec![0.0; n];
         order.iter().zip(&attacker).for_each(|(&j, &x)| own[j] = x);
         Ok(StepPolicy {
-            gains: Gains { rows: symmetry::back(&order, &gains.rows)?, ..gains },
+            gains: Gains { rows, ..gains },
+            terms,
             transition: symmetry::back(&order, &transition)?,
             attacker: own,
         })

@@ -144,7 +144,7 @@ pub fn simulate_with(
         }
         let step = policy.at(k, &topology, &mut solver, cancel)?;
         if recording {
-            record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+            record.push(policy, k, &z, &attacker, &topology, &step)?;
             recording = record.last_row_is_bounded(n + 2);
             if recording {
                 record.count(&step);
@@ -168,7 +168,7 @@ pub fn simulate_with(
                 if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {
                     let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
                     if recording {
-                        record.push(policy, k, &z, &attacker, &topology, &step, cancel)?;
+                        record.push(policy, k, &z, &attacker, &topology, &step)?;
                         record.certified += usize::from(step.gains.certified);
                         record.steps = k + 1;
                     }
@@ -251,7 +251,6 @@ impl Record {
         rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128)
     }
 
-    #[allow(clippy::too_many_arguments, reason = "what a row holds")]
     fn push(
         &mut self,
         policy: &Policy,
@@ -260,7 +259,6 @@ impl Record {
         attacker: &[f64],
         network: &Topology,
         step: &StepPolicy,
-        cancel: &CancelToken,
     ) -> Result<(), Stopped> {
         let dim = self.dim;
         within(WHAT, Self::bytes(policy, k + 1, dim), MOST_BYTES)?;
@@ -285,8 +283,7 @@ impl Record {
             apply(row, z, dim, &mut velocity);
             self.controls.extend_from_slice(&velocity);
         }
-        let problem = policy.problem(k, cancel)?;
-        self.terms.extend(problem.terms(policy.equilibrium().node(k), &step.gains.rows, cancel)?);
+        self.terms.extend_from_slice(&step.terms);
         self.networks.push(network.clone());
         append(WHAT, &mut self.gains, &step.gains.rows)?;
         self.theta.push(step.gains.theta);
