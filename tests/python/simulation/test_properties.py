@@ -183,8 +183,11 @@ def test_large_teams_in_short_games_are_played_or_refused_by_size(interaction, n
     )
     seen = tadcore.VisibilityNetwork.from_positions(sc).adjacency
     unknowns = 0 if seen.all() else int(seen.sum())
-    if 300 < unknowns < 9_000:  # played, too, but not within the time of a test
-        sc = sc.replace({"d*.visibility_radius": 1e-3})
+    # Played, too, but not within the time of a test: where no certificate holds, restarts of a large team take minutes.
+    if {9: 300, 30: 60}.get(n, 0) < unknowns < 9_000:
+        sc = sc.replace(
+            {"d*.visibility_radius": 1e-3} | ({"target.visibility_radius": 1e-3} if interaction == "I2" else {})
+        )
     if unknowns > 10_000:
         with pytest.raises(
             tadcore.OutOfMemoryError, match=r"the synthesis of the gains under one network: [\d,]+ bytes"
