@@ -19,7 +19,7 @@
 //! instant go through these stages together, their descents side by side; the incumbent that lets a descent end early
 //! is the best point before its stage, so no network's answer depends on which others were asked for. Everything here
 //! is a function of (t_k, topology) alone. How often each stage is needed: `docs/decisions/0003-synthesis.md`
-//! and `0013-exchanged-rows.md`.
+//! and `0016-exchanged-rows.md`.
 //!
 //! In this order, each file using those above it:
 //!
