@@ -218,5 +218,6 @@ def test_a_saved_table_with_a_right_checksum_is_still_not_believed(word, value):
     at = 8 * word + (struct.unpack_from("<Q", table, 24)[0] if word >= 5 else 0)
     table[at : at + 8] = struct.pack("<Q", value)
     table[-8:] = sealed(table[:-8])
-    with pytest.raises(ValueError, match=r"damaged|a table of this game has at most"):
+    said = "a table of this game has at most" if (word, value) == (4, 1 << 63) else "damaged"
+    with pytest.raises(ValueError, match=said):
         game_of(sc).load_table(bytes(table))
