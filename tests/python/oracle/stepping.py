@@ -8,6 +8,7 @@ from scipy.linalg import expm
 from .network import adjacency, distances
 from .riccati import equilibrium, feedback
 from .synthesis import solve
+from .worlds import margin
 
 
 @dataclass
@@ -20,6 +21,8 @@ class Run:
     time: float = 0.0
     positions: list = field(default_factory=list)
     networks: list = field(default_factory=list)
+    seen: list = field(default_factory=list)
+    """What was seen before anyone was told; only where a world was played."""
     found: list = field(default_factory=list)
     loops: list = field(default_factory=list)
     """Feedback rows of d1…dn, target, attacker in force over each step."""
@@ -99,8 +102,11 @@ class Remembering:
         return near
 
 
-def simulate(game, start, gains=None, look=None):
-    """Play the game once from `start`; `look` gives the network of positions, the paper's rule by default."""
+def simulate(game, start, gains=None, look=None, course=None):
+    """Play the game once from `start`; `look` gives the sight of positions, the paper's rule by default.
+
+    `course` is a trial of a world (see worlds): what fails, who is told, what displaces the players.
+    """
     gains = gains or Gains(game)
     look = look or (lambda positions: adjacency(positions, start.zeta))
     positions = np.array(start.positions, dtype=float)
@@ -117,6 +123,10 @@ def simulate(game, start, gains=None, look=None):
         if k == game.steps:
             break
         A = look(positions)
+        if course is not None:
+            A, seen = course.network(k, positions, start.zeta, sight=A)
+            run.seen.append(seen)
+            run.margin = min(run.margin, margin(course.world, positions, game.m))
         gap = np.abs(distances(positions)[: game.m] - start.zeta[:, None])
         run.margin = min(run.margin, np.min(gap[np.isfinite(gap)], initial=np.inf))
         if not run.networks or np.any(run.networks[-1] != A):
@@ -127,4 +137,6 @@ def simulate(game, start, gains=None, look=None):
         run.loops.append(rows)
         moved = transition(rows, game.step) @ np.vstack([positions[:-1] - positions[-1], positions[-1]])
         positions = np.vstack([moved[:-1] + moved[-1], moved[-1]])
+        if course is not None:
+            positions = positions + course.shock(k)
     return run
