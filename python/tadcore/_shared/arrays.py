@@ -114,3 +114,10 @@ def as_index(field: str, value: Any, most: int, *, least: int = 0) -> int:
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
         return int(value)
     raise ScenarioError(field, value, f"a whole number in [{least}, {most}]")
+
+
+def as_flag(field: str, value: Any) -> bool:
+    """True or False, NumPy's too; arrays and numbers are refused."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise ScenarioError(field, value, "True or False")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import Floats, as_index, as_positions
+from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
 from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, kind_counts
 from tadcore.scenario.model import Scenario
@@ -137,8 +137,9 @@ def simulate_batch(
     compare(starts, capture, sight, sc.n)
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
     continuous = as_termination(termination) == "continuous"
+    looking = as_flag("passes", passes)
     game = game_of(sc)
     kind, defender, time, diverged, passed = game.simulate_batch(
-        starts, sight, capture, continuous=continuous, passes=bool(passes), threads=workers
+        starts, sight, capture, continuous=continuous, passes=looking, threads=workers
     )
-    return Batch(kind, defender, time, diverged, passed if passes else None)
+    return Batch(kind, defender, time, diverged, passed if looking else None)

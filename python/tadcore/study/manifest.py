@@ -58,6 +58,8 @@ class Manifest:
         Names of the inputs.
     termination : {"sampled", "continuous"}
         When a game ends; written where it is not the sampled definition.
+    passes : bool
+        Whether passes within a capture radius are looked for; written where they are.
     version, created : str
         The version of this library, and when the store was made (UTC).
     environment : dict of str to str
@@ -73,6 +75,7 @@ class Manifest:
     stopped: int | None = None
     rule: dict[str, Any] | None = None
     termination: Termination = "sampled"
+    passes: bool = False
     chunk: int = CHUNK
     stream: int = STREAM
     version: str = _core.__version__
@@ -84,6 +87,7 @@ class Manifest:
         """Digest of everything that decides an outcome: scenario, vary, seed, design, chunk and stream."""
         decides: list[object] = [self.scenario, as_plain(self.vary), self.seed, self.design, self.chunk, self.stream]
         decides += [self.termination] if self.termination != "sampled" else []
+        decides += ["passes"] if self.passes else []
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
 
     def to_json(self) -> str:
@@ -105,6 +109,7 @@ class Manifest:
             "vary": as_plain(self.vary),
             "scenario": self.scenario,
             **({"termination": self.termination} if self.termination != "sampled" else {}),
+            **({"passes": True} if self.passes else {}),
         }
         if self.rule is not None:
             content["rule"] = self.rule
@@ -148,6 +153,7 @@ class Manifest:
                 trials=_whole(content, "trials"),
                 columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
                 termination=as_termination(content.get("termination", "sampled")),
+                passes=_entry({"passes": False} | content, "passes", bool),
                 stopped=None if content["stopped"] is None else _whole(content, "stopped"),
                 rule=_entry(content, "rule", dict) if "rule" in content else None,
                 chunk=_whole(content, "chunk"),

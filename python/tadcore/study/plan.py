@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,8 @@ class Outcomes(NamedTuple):
     diverged: NDArray[np.bool_]
     inputs: Floats
     """What was drawn, one column for each varied component."""
+    passed: NDArray[np.bool_] | None = None
+    """Whether a capture radius was entered between two instants, where that is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,7 @@ class Plan:
     seed: int
     design: Design
     termination: Termination = "sampled"
+    passes: bool = False
 
     @cached_property
     def varied(self) -> tuple[tuple[Quantity, Sampler], ...]:
@@ -129,9 +132,9 @@ class Plan:
         inputs = self.draw(chunk, rows)
         self.check(chunk, inputs)
         positions, sight, capture = setups(self.scenario, self.quantities, inputs)
-        radii = sight, capture
-        batch = simulate_batch(self.scenario, positions, *radii, threads=threads, termination=self.termination)
-        return Outcomes(batch.kind, batch.defender, batch.time, batch.diverged, inputs)
+        between: dict[str, Any] = {"termination": self.termination, "passes": self.passes}
+        batch = simulate_batch(self.scenario, positions, sight, capture, threads=threads, **between)
+        return Outcomes(batch.kind, batch.defender, batch.time, batch.diverged, inputs, batch.passed)
 
 
 def run_chunk(
@@ -140,6 +143,7 @@ def run_chunk(
     seed: int,
     design: Design,
     termination: Termination,
+    passes: bool,
     chunk: int,
     rows: int,
     threads: int | None,
@@ -147,4 +151,4 @@ def run_chunk(
     """`Plan.run` in another process, from the scenario's TOML; the process keeps its table from chunk to chunk."""
     from tadcore.scenario.model import Scenario
 
-    return Plan(Scenario.from_toml_string(scenario), vary, seed, design, termination).run(chunk, rows, threads)
+    return Plan(Scenario.from_toml_string(scenario), vary, seed, design, termination, passes).run(chunk, rows, threads)

@@ -157,7 +157,7 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
         return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=environment())
     there = Manifest.read(place)
     if there.study != wanted.study:
-        decides = ("scenario", "vary", "seed", "design", "chunk", "stream")
+        decides = ("scenario", "vary", "seed", "design", "chunk", "stream", "termination", "passes")
         differ = ", ".join(name for name in decides if getattr(there, name) != getattr(wanted, name))
         raise StoreError(str(place), f"it holds another study (its {differ} differ)", "name another folder")
     if there.version != wanted.version:

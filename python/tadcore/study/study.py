@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.arrays import Floats, as_flag, as_index
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError, StoreError
 from tadcore.game.compiled import as_scenario, game_of
@@ -79,6 +79,9 @@ class Study:
     termination : {"sampled", "continuous"}
         When a game ends: at an instant of the grid, or at the crossing of a capture radius itself; see
         `tadcore.simulate`. A store of one is not taken for a store of the other.
+    passes : bool
+        Whether to look for games that enter a capture radius between two instants: a column ``passed``, as in
+        `tadcore.Batch`. A store with it is not taken for one without.
 
     Raises
     ------
@@ -114,6 +117,7 @@ class Study:
         seed: int = 0,
         design: Design = "random",
         termination: Termination = "sampled",
+        passes: bool = False,
     ) -> None:
         if not isinstance(sc, Scenario):
             raise ScenarioError("sc", sc, "a tadcore.Scenario")
@@ -131,7 +135,7 @@ class Study:
                 raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
             samplers[name] = as_sampler(f'vary["{path}"]', value)
         key = as_index("seed", seed, 2**64 - 1)
-        self._plan = Plan(sc, samplers, key, design, as_termination(termination))
+        self._plan = Plan(sc, samplers, key, design, as_termination(termination), as_flag("passes", passes))
         for quantity, sampler in self._plan.varied:
             if design != "random" and not sampler.by_points:
                 rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
@@ -161,6 +165,11 @@ class Study:
     def termination(self) -> Termination:
         """When a game ends."""
         return self._plan.termination
+
+    @property
+    def passes(self) -> bool:
+        """Whether passes within a capture radius are looked for."""
+        return self._plan.passes
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -202,7 +211,7 @@ class Study:
     def replace(self, **changes: Any) -> Study:
         """Another study with some of the arguments changed."""
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
-        given |= {"design": self.design, "termination": self.termination}
+        given |= {"design": self.design, "termination": self.termination, "passes": self.passes}
         return Study(**{"sc": self.scenario, **given, **changes})
 
     @classmethod
@@ -301,6 +310,7 @@ class Study:
             trials=self.trials,
             columns=self.columns,
             termination=self.termination,
+            passes=self.passes,
         )
 
     def __repr__(self) -> str:
@@ -318,8 +328,9 @@ class StudyResult(Trials):
     table : pyarrow.Table
         One row for each trial: ``trial``, ``outcome`` (categorical: ``"timeout"``, ``"captured"``, ``"d1"``, …, or
         ``"diverged"``), ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none intercepted), ``time``,
-        ``diverged`` (whether the game diverged, see `tadcore.game.Divergence`), and a column for each varied component,
-        such as ``attacker.position.x``. The metadata of the schema explains each.
+        ``diverged`` (whether the game diverged, see `tadcore.game.Divergence`), ``passed`` where the study looks for
+        passes, and a column for each varied component, such as ``attacker.position.x``. The metadata of the schema
+        explains each.
     scenario : Scenario
         The scenario around which the inputs vary.
     seed : int
@@ -424,6 +435,7 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
         seed=manifest.seed,
         design=manifest.design,  # type: ignore[arg-type]  # the constructor checks it
         termination=manifest.termination,
+        passes=manifest.passes,
     )
     store = Store.reading(folder, manifest, study._plan)
     wanted = manifest.trials if manifest.stopped is None else manifest.stopped

@@ -1,9 +1,9 @@
 """The outcomes of a study as Arrow tables, and their bytes as Parquet.
 
-The columns that every study has are `FIXED`; behind them stands one for each varied component, a float64 such as
-``attacker.position.x``. What a column means and its unit are in the metadata of its field; version, scenario, seed,
-design and the meanings again, as JSON for readers that see no fields' metadata, in the metadata of the schema. So a
-part explains itself, to any reader of Parquet.
+The columns that every study has are `FIXED`, and `PASSED` where passes are looked for; behind them stands one for each
+varied component, a float64 such as ``attacker.position.x``. What a column means and its unit are in the metadata of its
+field; version, scenario, seed, design and the meanings again, as JSON for readers that see no fields' metadata, in the
+metadata of the schema. So a part explains itself, to any reader of Parquet.
 
 The bytes of a part depend on its rows and its study alone: the settings of the writer are fixed, and no date is in it.
 """
@@ -82,6 +82,14 @@ FIXED = {
         lambda _, o, __: o.diverged,
     ),
 }
+PASSED = {
+    "passed": Column(
+        pa.bool_(),
+        "whether a capture radius was entered between two instants, before the one that ended the game: with "
+        "continuous termination the game would end there",
+        lambda _, o, __: o.passed,
+    )
+}
 _INPUTS = {
     "position": "where the player starts, one coordinate",
     "visibility_radius": "how far the player sees; inf without limit",
@@ -89,10 +97,15 @@ _INPUTS = {
 }
 
 
+def _own(plan: Plan) -> dict[str, Column]:
+    """The columns of a study beside those of its inputs."""
+    return FIXED | PASSED if plan.passes else FIXED
+
+
 def schema_of(plan: Plan) -> pa.Schema:
     """The schema of a study's table; no entry is ever missing."""
     inputs = {name: (pa.float64(), _INPUTS[q.field], _UNIT) for q in plan.quantities for name in q.columns}
-    columns = {name: (column.type, column.meaning, column.unit) for name, column in FIXED.items()} | inputs
+    columns = {name: (column.type, column.meaning, column.unit) for name, column in _own(plan).items()} | inputs
     about = {
         name: {"meaning": meaning} | ({"unit": unit} if unit else {}) for name, (_, meaning, unit) in columns.items()
     }
@@ -109,7 +122,7 @@ def schema_of(plan: Plan) -> pa.Schema:
 
 def table_of(chunk: int, outcomes: Outcomes, plan: Plan, schema: pa.Schema) -> pa.Table:
     """One chunk as a table."""
-    fixed = [column.values(chunk * CHUNK, outcomes, plan.scenario) for column in FIXED.values()]
+    fixed = [column.values(chunk * CHUNK, outcomes, plan.scenario) for column in _own(plan).values()]
     arrays = [*fixed, *np.ascontiguousarray(outcomes.inputs.T)]
     return pa.Table.from_arrays([pa.array(array) for array in arrays], schema=schema)
 

@@ -18,7 +18,7 @@ from tadcore.simulation.passes import Termination
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
 from tadcore.statistics.stopping import Stopping
 
-from .table import FIXED
+from .table import FIXED, PASSED
 
 if TYPE_CHECKING:
     import pandas
@@ -61,12 +61,21 @@ class Trials:
         return self._column("diverged")
 
     @cached_property
+    def passed(self) -> NDArray[np.bool_] | None:
+        """Whether a capture radius was entered between two instants, shape (trials,); see `tadcore.Batch`.
+
+        None where the study did not look for that: ``Study(…, passes=True)``.
+        """
+        return self._column("passed") if "passed" in self.table.column_names else None
+
+    @cached_property
     def inputs(self) -> dict[str, Floats]:
         """What was drawn: an array of shape (trials,) for each varied component, by the name of its column.
 
         Any spelling of a path finds it: ``inputs["d1.visibility_radius"]``.
         """
-        return ByPath({name: self._column(name) for name in self.table.column_names if name not in FIXED})
+        own = FIXED | PASSED
+        return ByPath({name: self._column(name) for name in self.table.column_names if name not in own})
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""

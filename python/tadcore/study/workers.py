@@ -35,7 +35,7 @@ def _submitted(plan: Plan, jobs: Sequence[Job], executor: Executor, threads: int
     """Keep a bounded number of chunks in flight, enough for every worker to have the next one at hand."""
     workers = getattr(executor, "_max_workers", None)
     bound = 2 * (workers if isinstance(workers, int) else _UNKNOWN_WORKERS)
-    fixed = (plan.scenario.to_toml(), plan.vary, plan.seed, plan.design, plan.termination)
+    fixed = (plan.scenario.to_toml(), plan.vary, plan.seed, plan.design, plan.termination, plan.passes)
     waiting = iter(jobs)
     running: dict[Future[Outcomes], int] = {}
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 
 import numpy as np
@@ -277,12 +278,40 @@ def test_a_study_knows_when_its_games_end(tmp_path):
         incidence(continuous.kind, continuous.defender, continuous.time, horizon=6.0, step=0.05, n=1)
 
 
+def test_a_study_looks_for_passes_where_it_is_asked_to(tmp_path):
+    vary = {"d1.position": Box([-1.5, -0.02], [1.5, 0.02])}
+    plain = tadcore.Study(SUICIDE, vary, trials=200, seed=3)
+    asked = plain.replace(passes=True)
+    result = asked.run(store=tmp_path / "asked")
+    assert plain.run().passed is None
+    assert "passed" not in plain.run().table.column_names
+    for trial in range(0, 200, 13):
+        assert result.passed[trial] == (len(result.replay(trial).passes) > 0)
+    assert 0 < result.passed.sum() < 200
+    assert list(result.inputs) == ["defenders.0.position.x", "defenders.0.position.y"]
+    loaded = tadcore.load_study(tmp_path / "asked")
+    assert loaded.study.passes
+    assert loaded.table.equals(result.table)
+    with pytest.raises(StoreError, match="its passes differ"):
+        plain.run(store=tmp_path / "asked")
+    with pytest.raises(StoreError, match="its termination differ"):
+        asked.replace(termination="continuous").run(store=tmp_path / "asked")
+    with ProcessPoolExecutor(1) as pool:
+        assert asked.run(executor=pool).table.equals(result.table)
+    for wrong in (1, "yes", np.array([True, False])):
+        with pytest.raises(ScenarioError, match="passes: got"):
+            plain.replace(passes=wrong)
+        with pytest.raises(ScenarioError, match="passes: got"):
+            tadcore.simulate_batch(SUICIDE, [SUICIDE.positions], passes=wrong)
+
+
 def test_a_study_file_and_the_command_line_take_it(tmp_path, capsys):
     (tmp_path / "s.toml").write_text(SUICIDE.to_toml(), encoding="utf-8")
-    text = 'scenario = "s.toml"\ntrials = 5\ntermination = "continuous"\n[vary]\n'
+    text = 'scenario = "s.toml"\ntrials = 5\ntermination = "continuous"\npasses = true\n[vary]\n'
     (tmp_path / "study.toml").write_text(text + '"d1.capture_radius" = { values = [0.01] }\n', encoding="utf-8")
     study = tadcore.Study.from_toml(tmp_path / "study.toml")
     assert study.termination == "continuous"
+    assert study.passes
     assert set(study.run().defender) == {0}
 
     def told(*options):
