@@ -23,41 +23,33 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from tadcore._shared.arrays import Floats, as_flag, as_index
+from tadcore._shared.arrays import as_index
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError, StoreError
-from tadcore.game.compiled import as_scenario, game_of
-from tadcore.sampling.adapters import as_sampler, from_table
-from tadcore.sampling.base import Sampler
-from tadcore.sampling.design import DESIGNS, Design
+from tadcore.game.compiled import game_of
+from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
-from tadcore.scenario.paths import normal
-from tadcore.scenario.quantities import Quantity, setups
-from tadcore.simulation.passes import Termination, as_termination
+from tadcore.scenario.quantities import setups
 from tadcore.simulation.run import Run, simulate
 from tadcore.statistics.stopping import Stopping, from_kept
 
-from .collect import Collection, StoppingRule, jobs_of
+from .collect import Collection, StoppingRule
+from .definition import Definition
 from .manifest import MANIFEST, Manifest
-from .plan import Plan
 from .progress import Progress
 from .store import Store
 from .trials import Trials
 from .warm_start import warm
 
-_MOST_TRIALS = 2**32  # points of the Sobol' sequence
 
-
-class Study:
+class Study(Definition):
     """Many games around one scenario.
 
     Parameters
@@ -107,106 +99,6 @@ class Study:
     >>> result.replay(3).outcome.time == result.time[3]
     np.True_
     """
-
-    def __init__(
-        self,
-        sc: Scenario,
-        vary: Mapping[str, Any],
-        *,
-        trials: int,
-        seed: int = 0,
-        design: Design = "random",
-        termination: Termination = "sampled",
-        passes: bool = False,
-    ) -> None:
-        if not isinstance(sc, Scenario):
-            raise ScenarioError("sc", sc, "a tadcore.Scenario")
-        as_scenario(sc)
-        if not isinstance(vary, Mapping) or not vary:
-            example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
-            raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
-        if not isinstance(design, str) or design not in DESIGNS:
-            raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
-        self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
-        samplers: dict[str, Sampler] = {}
-        for path, value in vary.items():
-            name = normal(path, "vary")
-            if name in samplers:
-                raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
-            samplers[name] = as_sampler(f'vary["{path}"]', value)
-        key = as_index("seed", seed, 2**64 - 1)
-        self._plan = Plan(sc, samplers, key, design, as_termination(termination), as_flag("passes", passes))
-        for quantity, sampler in self._plan.varied:
-            if design != "random" and not sampler.by_points:
-                rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
-                raise ScenarioError(f'vary["{quantity.path}"]', sampler, rule)
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario around which the inputs vary."""
-        return self._plan.scenario
-
-    @property
-    def vary(self) -> Mapping[str, Sampler]:
-        """The sampler of every path."""
-        return MappingProxyType(self._plan.vary)
-
-    @property
-    def seed(self) -> int:
-        """The seed."""
-        return self._plan.seed
-
-    @property
-    def design(self) -> Design:
-        """The design of the draws."""
-        return self._plan.design
-
-    @property
-    def termination(self) -> Termination:
-        """When a game ends."""
-        return self._plan.termination
-
-    @property
-    def passes(self) -> bool:
-        """Whether passes within a capture radius are looked for."""
-        return self._plan.passes
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """What varies, wildcards expanded."""
-        return self._plan.quantities
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of the inputs, one for each varied component."""
-        return self._plan.columns
-
-    def inputs(self, trials: int | None = None) -> dict[str, Floats]:
-        """Draw without playing: the inputs of the first trials, all of them by default, by the name of the column.
-
-        Parameters
-        ----------
-        trials : int, optional
-            How many.
-        """
-        wanted = self.trials if trials is None else as_index("trials", trials, self.trials, least=1)
-        drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
-        return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
-
-    def check(self, *, progress: bool = False) -> None:
-        """Draw every trial without playing, as `run` does before anything else; a million take 0.1 s.
-
-        Parameters
-        ----------
-        progress : bool
-            Show a bar in a terminal or a notebook.
-
-        Raises
-        ------
-        ScenarioError
-            A draw is no game: the path, the trial and the value are named.
-        """
-        self._plan.check_ahead(self.trials, progress=progress)
 
     def replace(self, **changes: Any) -> Study:
         """Another study with some of the arguments changed."""
@@ -295,27 +187,11 @@ class Study:
         kept_table = None if table is None else as_path("table", table)
         self.check(progress=bool(progress))
         game_of(self.scenario).equilibrium()
-        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self._manifest(), self._plan)
+        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self.manifest(), self._plan)
         with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:
             chunks = Collection(self._plan, self.trials, kept, bar, until)
             played = chunks.gather(executor, workers)
             return StudyResult(self, played, chunks.stopping)
-
-    def _manifest(self) -> Manifest:
-        return Manifest(
-            scenario=self.scenario.to_toml(),
-            vary={path: sampler.table() for path, sampler in self.vary.items()},
-            seed=self.seed,
-            design=self.design,
-            trials=self.trials,
-            columns=self.columns,
-            termination=self.termination,
-            passes=self.passes,
-        )
-
-    def __repr__(self) -> str:
-        paths = ", ".join(self.vary)
-        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"
 
 
 class StudyResult(Trials):
