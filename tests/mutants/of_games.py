@@ -53,7 +53,10 @@ MUTANTS = {
             "if let Some(i) = «nearest.1» {",
             "nearest.1.filter(|_| squared_norm(&z[self.defenders.len() * dim..]) > self.attacker)",
         ),
+    ],
+    "simulation/state.rs": [
         ("z = X − X_a", ".map(|(x, a)| «x - a»)", "x + a"),
+        ("row times z", "«*o += g * x;»", "*o -= g * x;"),
     ],
     "simulation/divergence.rs": [
         ("divergence: the largest distance at the start", "most.max(«squared_distance(a, b)»)", "0.0"),
@@ -62,7 +65,6 @@ MUTANTS = {
     "simulation/record.rs": [
         ("attacker by its own row", "for_each(|(x, d)| «*x += d»)", "*x -= d"),
         ("X = z + X_a", ".map(|(x, a)| «x + a»)", "x - a"),
-        ("row times z", "«*o += g * x;»", "*o -= g * x;"),
         ("timeout only at T", "(«k == last»).then_some", "k + 1 == last"),
         ("the network at the start", "if «end.is_none() || k == 0»", "end.is_none()"),
         (
@@ -99,7 +101,7 @@ MUTANTS = {
         ("Gramian: series", "w.iter_mut().zip(&term).for_each(|(w, x)| «*w += x»);", "*w -= x"),
         ("Gramian: CᵀT + TC", "half[ij] «+» half[ij % n * n + ij / n]", "-"),
     ],
-    "ensemble/chunk.rs": [
+    "ensemble/trials.rs": [
         ("batches: z = X − X_a", "«x - attacker[e % dim]»", "x + attacker[e % dim]"),
     ],
     "ensemble/block.rs": [

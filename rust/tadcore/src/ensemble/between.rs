@@ -4,8 +4,8 @@
 //! vector operations who stayed clear, by the largest ‖C‖ among the table's entries at this instant; the few others are
 //! examined exactly, by the arithmetic of a recorded run. None of this runs unless it is asked for.
 
-use super::block::{BLOCK, Blocks, PerTrial, playing};
-use super::chunk::Chunk;
+use super::block::{BLOCK, PerTrial, playing};
+use super::trials::Trials;
 use super::{Between, End};
 use crate::cancel::CancelToken;
 use crate::error::RunError;
@@ -33,9 +33,9 @@ impl Watch {
     }
 
     /// Keeps the states at an instant.
-    pub(super) fn note(&mut self, blocks: &Blocks, who: &[u32]) {
-        self.before.clone_from(&blocks.z);
-        for (place, &trial) in who[..blocks.live].iter().enumerate() {
+    pub(super) fn note(&mut self, trials: &Trials) {
+        self.before.clone_from(&trials.blocks.z);
+        for (place, &trial) in trials.who[..trials.blocks.live].iter().enumerate() {
             self.place[trial as usize] = place as u32;
         }
     }
@@ -45,82 +45,80 @@ impl Watch {
         let place = self.place[trial] as usize;
         self.before[place / BLOCK * width..][..width].iter().map(|numbers| numbers[place % BLOCK]).collect()
     }
-}
 
-impl Chunk<'_> {
     /// Looks at what happened from t_k to now, when every live trial has moved.
     pub(super) fn look(
         &mut self,
+        trials: &mut Trials,
         k: usize,
-        watch: &mut Watch,
         ends: &mut [End],
         cancel: &CancelToken,
     ) -> Result<(), RunError> {
-        let (size, dim) = (self.shape.size, self.shape.dim);
-        let (width, step) = (size * dim, self.policy.game().grid().step());
-        let stretch = clear(self.policy.transitions().rate(k) * step);
+        let (size, dim) = (trials.shape.size, trials.shape.dim);
+        let (width, step) = (size * dim, trials.policy.game().grid().step());
+        let stretch = clear(trials.policy.transitions().rate(k) * step);
         let mut over = Vec::new();
-        for block in 0..self.blocks.live.div_ceil(BLOCK) {
-            let places = block * BLOCK..self.blocks.live.min((block + 1) * BLOCK);
-            let moved_in = places.clone().any(|place| watch.place[self.who[place] as usize] as usize != place);
-            watch.gathered.clear();
-            watch.gathered.extend_from_slice(&watch.before[block * width..(block + 1) * width]);
+        for block in 0..trials.blocks.live.div_ceil(BLOCK) {
+            let places = block * BLOCK..trials.blocks.live.min((block + 1) * BLOCK);
+            let moved_in = places.clone().any(|place| self.place[trials.who[place] as usize] as usize != place);
+            self.gathered.clear();
+            self.gathered.extend_from_slice(&self.before[block * width..(block + 1) * width]);
             if moved_in {
                 for place in places {
-                    let state = watch.state(self.who[place] as usize, width);
-                    watch.gathered.iter_mut().zip(state).for_each(|(numbers, x)| numbers[place % BLOCK] = x);
+                    let state = self.state(trials.who[place] as usize, width);
+                    self.gathered.iter_mut().zip(state).for_each(|(numbers, x)| numbers[place % BLOCK] = x);
                 }
             }
-            let now = &self.blocks.z[block * width..(block + 1) * width];
-            let capture = &self.blocks.capture[block * self.blocks.capture_step..][..size];
-            let bits = near(&watch.gathered, now, capture, dim, stretch) & playing(self.blocks.live, block);
+            let now = &trials.blocks.z[block * width..(block + 1) * width];
+            let capture = &trials.blocks.capture[block * trials.blocks.capture_step..][..size];
+            let bits = near(&self.gathered, now, capture, dim, stretch) & playing(trials.blocks.live, block);
             for member in (0..BLOCK).filter(|member| bits >> member & 1 == 1) {
-                if self.examine(k, block * BLOCK + member, watch, ends, cancel)? {
+                if self.examine(trials, k, block * BLOCK + member, ends, cancel)? {
                     over.push(block * BLOCK + member);
                 }
             }
         }
         // From the last place down, so that none that moves in is over.
         for &place in over.iter().rev() {
-            self.remove(place);
+            trials.remove(place);
         }
         if !over.is_empty() {
-            self.fill_up();
+            trials.fill_up();
         }
         Ok(())
     }
 
     /// Examines the step of one trial; whether it is over.
     fn examine(
-        &self,
+        &mut self,
+        trials: &Trials,
         k: usize,
         place: usize,
-        watch: &mut Watch,
         ends: &mut [End],
         cancel: &CancelToken,
     ) -> Result<bool, RunError> {
-        let (size, dim, trial) = (self.shape.size, self.shape.dim, self.who[place] as usize);
-        let continuous = watch.between.termination == Termination::Continuous;
+        let (size, dim, trial) = (trials.shape.size, trials.shape.dim, trials.who[place] as usize);
+        let continuous = self.between.termination == Termination::Continuous;
         let end = &mut ends[trial];
         if !continuous && end.passed {
             return Ok(false);
         }
-        let (start, now) = (watch.state(trial, size * dim), self.state(place));
-        let sight: Vec<f64> = (0..self.shape.rows)
-            .map(|i| self.blocks.sight[place / BLOCK * self.blocks.sight_step + i][place % BLOCK])
+        let (start, now) = (self.state(trial, size * dim), trials.state(place));
+        let sight: Vec<f64> = (0..trials.shape.rows)
+            .map(|i| trials.blocks.sight[place / BLOCK * trials.blocks.sight_step + i][place % BLOCK])
             .collect();
-        let mut network = Topology::empty(self.shape.rows, size);
+        let mut network = Topology::empty(trials.shape.rows, size);
         observe(&start, dim, &sight, &mut network);
-        let policy = self.policy.at(k, &network, &mut watch.solver, cancel)?;
-        let reach = Reach::new(self.batch.capture_row(self.first + trial, size));
+        let policy = trials.policy.at(k, &network, &mut self.solver, cancel)?;
+        let reach = Reach::new(trials.batch.capture_row(trials.first + trial, size));
         let step = Step { k, gains: &policy.gains.rows, start: &start, end: &now, dim };
         if !continuous {
             let mut passes = Vec::new();
-            step.passes(self.policy, &reach, &mut passes, cancel)?;
+            step.passes(trials.policy, &reach, &mut passes, cancel)?;
             end.passed = !passes.is_empty();
             return Ok(false);
         }
-        let Some((row, after, ..)) = step.end(self.policy, &reach, cancel)? else { return Ok(false) };
+        let Some((row, after, ..)) = step.end(trials.policy, &reach, cancel)? else { return Ok(false) };
         (end.outcome, end.step, end.after) = (Pass::outcome(row, size - 1), k, after);
         Ok(true)
     }

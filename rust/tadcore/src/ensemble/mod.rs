@@ -15,6 +15,7 @@
 
 mod between;
 mod chunk;
+mod trials;
 
 use std::thread::available_parallelism;
 

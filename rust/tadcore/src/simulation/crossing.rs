@@ -15,7 +15,7 @@
 //! | sup ‖exp(Cτ)‖, τ ≤ w | [`Level::growth`] | in the norm of row sums |
 //! | Σ_j \|C_ij\|, C² | `norm`, `square` | what bounds ‖z̈_i‖ |
 
-use super::record::apply;
+use super::state::apply;
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
 use crate::memory::zeros;

@@ -17,10 +17,12 @@ mod outcome;
 pub(crate) mod passes;
 mod record;
 mod setup;
+mod state;
 
 pub use divergence::DIVERGED;
-pub use outcome::{Outcome, Reach, distance, relative_state};
+pub use outcome::{Outcome, Reach};
 pub use passes::{Pass, Termination};
-pub(crate) use record::apply;
 pub use record::{Divergence, Record, simulate, simulate_with};
 pub use setup::Setup;
+pub(crate) use state::apply;
+pub use state::relative_state;

@@ -3,7 +3,7 @@
 //! At every grid instant, in this order: the nearest defender within its own capture radius intercepts the attacker;
 //! otherwise the attacker captures the target when it is within σ_a; at t = T the game times out.
 
-use crate::network::{squared_distance, squared_norm, squared_reach};
+use crate::network::{squared_norm, squared_reach};
 
 /// How a game ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -79,19 +79,6 @@ impl Reach {
         let target = &z[self.defenders.len() * dim..];
         (squared_norm(target) <= self.attacker).then_some(Outcome::Captured)
     }
-}
-
-/// z from positions ordered d₁…d_n, target, attacker: every row less the attacker's.
-pub fn relative_state(positions: &[f64], dim: usize, z: &mut Vec<f64>) {
-    let (players, attacker) = positions.split_at(positions.len() - dim);
-    z.clear();
-    z.extend(players.chunks_exact(dim).flat_map(|row| row.iter().zip(attacker).map(|(x, a)| x - a)));
-}
-
-/// Distance between two points, as the network and the termination test round it.
-#[must_use]
-pub fn distance(a: &[f64], b: &[f64]) -> f64 {
-    squared_distance(a, b).sqrt()
 }
 
 #[cfg(test)]

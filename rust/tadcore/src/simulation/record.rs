@@ -1,9 +1,10 @@
 //! One game, everything recorded.
 
 use super::divergence;
-use super::outcome::{Outcome, Reach, relative_state};
+use super::outcome::{Outcome, Reach};
 use super::passes::{Pass, Step, Termination};
 use super::setup::Setup;
+use super::state::{apply, relative_state};
 use crate::cancel::CancelToken;
 use crate::error::{RunError, Stopped};
 use crate::game::Grid;
@@ -194,16 +195,6 @@ fn advance(step: &StepPolicy, z: &[f64], dim: usize, next: &mut [f64], attacker:
     let mut moved = vec![0.0; dim];
     apply(&step.attacker, z, dim, &mut moved);
     attacker.iter_mut().zip(moved).for_each(|(x, d)| *x += d);
-}
-
-/// out = row · z.
-pub(crate) fn apply(row: &[f64], z: &[f64], dim: usize, out: &mut [f64]) {
-    out.fill(0.0);
-    for (g, zj) in row.iter().zip(z.chunks_exact(dim)) {
-        for (o, x) in out.iter_mut().zip(zj) {
-            *o += g * x;
-        }
-    }
 }
 
 impl Record {

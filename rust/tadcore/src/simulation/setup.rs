@@ -1,6 +1,6 @@
 //! What one run adds to a game: positions and radii, checked before anything runs.
 
-use super::outcome::relative_state;
+use super::state::relative_state;
 use crate::error::GameError;
 use crate::game::Game;
 use crate::game::validation::{FARTHEST, FINEST, is_positive, positive, rule};
