@@ -39,11 +39,11 @@ from .game.divergence import Divergence as Divergence
 from .game.equilibrium import Equilibrium as Equilibrium, solve_equilibrium as solve_equilibrium
 from .game.network import VisibilityNetwork as VisibilityNetwork
 from .game.outcome import Outcome as Outcome, OutcomeKind as OutcomeKind
+from .game.passes import Pass as Pass
 from .game.synthesis import Gains as Gains, synthesize as synthesize
 from .scenario.model import Attacker as Attacker, Defender as Defender, Scenario as Scenario, Target as Target
 from .simulation.batch import Batch as Batch, simulate_batch as simulate_batch
 from .simulation.loading import load_run as load_run
-from .simulation.passes import Pass as Pass
 from .simulation.run import Run as Run, simulate as simulate
 from .statistics import HalfWidth as HalfWidth
 from .statistics.radius import RadiusCurve as RadiusCurve

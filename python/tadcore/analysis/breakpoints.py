@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_amount
 from tadcore.errors import ScenarioError
+from tadcore.game.outcome import OutcomeKind
 from tadcore.simulation.batch import Batch
 from tadcore.statistics.single_radii import Breakpoints
 
@@ -51,21 +52,25 @@ def breakpoints(games: Replays, grid: Floats, played: list[Batch], tolerance: fl
         kind_after=_kind(above),
         defender_before=_defender(below),
         defender_after=_defender(above),
+        diverged_before=below == _LOST,
+        diverged_after=above == _LOST,
         tolerance=float(tolerance),
     )
 
 
 def _code(batch: Batch) -> NDArray[np.int64]:
-    """Kind and defender in one number."""
-    return np.asarray((batch.kind.astype(np.int64) << 32) + (batch.defender.astype(np.int64) + 1))
+    """Kind and defender in one number; all games that diverged are one outcome, as in every table."""
+    sound = (batch.kind.astype(np.int64) << 32) + (batch.defender.astype(np.int64) + 1)
+    return np.where(batch.diverged, _LOST, sound)
 
 
 def _kind(code: NDArray[np.int64]) -> NDArray[np.int8]:
-    return (code >> 32).astype(np.int8)
+    return np.where(code == _LOST, OutcomeKind.TIMEOUT, code >> 32).astype(np.int8)
 
 
 def _defender(code: NDArray[np.int64]) -> NDArray[np.int32]:
     return ((code & 0xFFFFFFFF) - 1).astype(np.int32)
 
 
+_LOST = 1 << 62  # of games that diverged; has no defender in its lower half
 _NONE = (np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))

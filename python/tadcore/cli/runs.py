@@ -50,8 +50,8 @@ def simulate(
         usable(out)
     if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
-    from tadcore.simulation.passes import as_termination
     from tadcore.simulation.run import simulate as play
+    from tadcore.simulation.termination import as_termination
 
     when = as_termination(termination)
     run = play(sc) if when == "sampled" else play(sc, termination=when)

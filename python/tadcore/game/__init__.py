@@ -6,6 +6,7 @@ from .divergence import Divergence
 from .equilibrium import Equilibrium, solve_equilibrium
 from .network import VisibilityNetwork
 from .outcome import Outcome, OutcomeKind
+from .passes import Pass
 from .recorded import Recorded
 from .synthesis import Gains, synthesize
 
@@ -18,6 +19,7 @@ __all__ = [
     "NetworkChange",
     "Outcome",
     "OutcomeKind",
+    "Pass",
     "Recorded",
     "VisibilityNetwork",
     "solve_equilibrium",

@@ -17,6 +17,7 @@ from tadcore.scenario.model import Scenario
 from .changes import Interval, NetworkChange
 from .divergence import Divergence
 from .outcome import Outcome
+from .passes import Pass
 
 
 class Recorded(Protocol):
@@ -61,6 +62,10 @@ class Recorded(Protocol):
     @property
     def theta_terms(self) -> Floats:
         """Its terms, unweighted, shape (L + 1, 4 or 3)."""
+
+    @property
+    def passes(self) -> tuple[Pass, ...]:
+        """Capture radii entered between two instants."""
 
     @property
     def network_changes(self) -> tuple[NetworkChange, ...]:

@@ -13,6 +13,7 @@ from tadcore.scenario.model import Scenario
 from .changes import Interval, NetworkChange, intervals_of
 from .divergence import Divergence
 from .outcome import Outcome
+from .passes import Pass
 from .recorded import Recorded
 
 
@@ -30,6 +31,7 @@ class Sound:
     gains: Floats
     theta: Floats
     theta_terms: Floats
+    passes: tuple[Pass, ...]
     network_changes: tuple[NetworkChange, ...]
 
     def intervals(self) -> tuple[Interval, ...]:
@@ -54,5 +56,6 @@ def until_divergence(run: Recorded) -> Recorded:
         gains=run.gains[rows],
         theta=run.theta[rows],
         theta_terms=run.theta_terms[rows],
+        passes=run.passes,
         network_changes=tuple(change for change in run.network_changes if change.time < end or not change.time),
     )

@@ -1,7 +1,8 @@
 """Games played: one with everything recorded, or many in a batch with their outcomes alone."""
 
+from tadcore.game.passes import Pass
+
 from .batch import Batch, simulate_batch
-from .passes import Pass
 from .run import Run, simulate
 
 __all__ = ["Batch", "Pass", "Run", "simulate", "simulate_batch"]

@@ -13,8 +13,8 @@ from tadcore.game.compiled import as_scenario, game_of
 from tadcore.game.outcome import Outcome, kind_counts
 from tadcore.scenario.model import Scenario
 
-from .passes import Termination, as_termination
 from .rules import capture_rows, compare, visibility_rows
+from .termination import Termination, as_termination
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +39,7 @@ class Batch:
         same rules, but ``kind`` and ``time`` say nothing of a pursuit then. Statistics count such games apart.
     passed : ndarray of bool, shape (M,), or None
         Whether a capture radius was entered between two instants, before the one that ended the game: with continuous
-        termination the game would end there. None where that was not asked for.
+        termination the game would end there. Not looked for after a divergence. None where that was not asked for.
     """
 
     kind: NDArray[np.int8]

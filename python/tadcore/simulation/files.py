@@ -22,7 +22,7 @@ from tadcore.game.recorded import Recorded
 from tadcore.game.synthesis import theta_terms
 from tadcore.scenario.provenance import provenance
 
-from .passes import Pass, Termination
+from .termination import Termination
 from .variants import Variant, told
 
 SUFFIX = ".nc"
@@ -44,10 +44,6 @@ class Written(Recorded, Variant, Protocol):
     @property
     def termination(self) -> Termination:
         """See `tadcore.simulate`."""
-
-    @property
-    def passes(self) -> tuple[Pass, ...]:
-        """Capture radii entered between two instants."""
 
     @property
     def costs(self) -> dict[str, float]:

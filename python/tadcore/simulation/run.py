@@ -20,10 +20,11 @@ from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
 from tadcore.game.divergence import Divergence
 from tadcore.game.outcome import Outcome
+from tadcore.game.passes import Pass
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
 
-from .passes import Pass, Termination, as_termination
+from .termination import Termination, as_termination
 from .variants import told
 
 if TYPE_CHECKING:
@@ -68,8 +69,8 @@ class Run:
     unconverged : int
         Instants at which the synthesis stopped short of its tolerance.
     passes : tuple of Pass
-        Capture radii entered between two instants, where termination is not tested, in the order of time; empty with
-        continuous termination.
+        Capture radii entered between two instants, where termination is not tested, in the order of time, up to a
+        divergence; empty with continuous termination.
     termination : {"sampled", "continuous"}
         When the game ends, see `simulate`.
     diverged : Divergence or None

@@ -22,9 +22,11 @@ class Breakpoints:
     radius : ndarray, shape (B,)
         The least radius at which the new outcome holds, to within ``tolerance`` from above.
     kind_before, kind_after : ndarray of int8, shape (B,)
-        Codes of `OutcomeKind` below and at ``radius``, whether or not the game diverged.
+        Codes of `OutcomeKind` below and at ``radius``; 0 where the game diverged.
     defender_before, defender_after : ndarray of int32, shape (B,)
         The intercepting defender, 0-based; -1 where none intercepts.
+    diverged_before, diverged_after : ndarray of bool, shape (B,)
+        Whether the game diverged below and at ``radius``: an outcome of its own, however the game then ended.
     tolerance : float
         How far above the true breakpoint ``radius`` may lie.
     """
@@ -35,13 +37,17 @@ class Breakpoints:
     kind_after: NDArray[np.int8]
     defender_before: NDArray[np.int32]
     defender_after: NDArray[np.int32]
+    diverged_before: NDArray[np.bool_]
+    diverged_after: NDArray[np.bool_]
     tolerance: float
 
     def __len__(self) -> int:
         return len(self.trial)
 
     def __repr__(self) -> str:
-        return f"Breakpoints({len(self):,} in {len(np.unique(self.trial)):,} trials)"
+        lost = int(np.count_nonzero(self.diverged_before | self.diverged_after))
+        of = f", {lost:,} of them into or out of a divergence" if lost else ""
+        return f"Breakpoints({len(self):,} in {len(np.unique(self.trial)):,} trials{of})"
 
 
 @dataclass(frozen=True, repr=False)

@@ -17,7 +17,7 @@ from tadcore.sampling.design import DESIGNS, Design
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity
-from tadcore.simulation.passes import Termination, as_termination
+from tadcore.simulation.termination import Termination, as_termination
 
 from .collect import jobs_of
 from .manifest import Manifest

@@ -20,7 +20,7 @@ from tadcore._shared.files import MOST, strange
 from tadcore.errors import StoreError, shorten
 from tadcore.sampling.adapters import as_plain, from_plain
 from tadcore.sampling.design import CHUNK, STREAM
-from tadcore.simulation.passes import Termination, as_termination
+from tadcore.simulation.termination import Termination, as_termination
 
 Kind = TypeVar("Kind")
 

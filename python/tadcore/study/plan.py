@@ -19,8 +19,8 @@ from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.batch import simulate_batch
-from tadcore.simulation.passes import Termination
 from tadcore.simulation.rules import extents_of
+from tadcore.simulation.termination import Termination
 
 from .vary import quantities
 

@@ -26,7 +26,7 @@ from tadcore import _core
 from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.sampling.design import CHUNK
 from tadcore.scenario.model import Scenario
-from tadcore.simulation.passes import Termination
+from tadcore.simulation.termination import Termination
 
 from .plan import Outcomes, Plan
 

@@ -14,7 +14,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.game.outcome import kind_counts
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath
-from tadcore.simulation.passes import Termination
+from tadcore.simulation.termination import Termination
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
 from tadcore.statistics.stopping import Stopping
 

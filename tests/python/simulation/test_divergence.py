@@ -231,3 +231,89 @@ def test_panels_comparisons_and_animations_end_there_too(agg):
 def test_a_run_that_does_not_diverge_is_drawn_as_it_is():
     run = tadcore.simulate(unstable(0.6))
     assert until_divergence(run) is run
+
+
+LATE = tadcore.Scenario.model_validate(
+    {
+        "interaction": "I2",
+        "horizon": 7.322199828103176,
+        "step": 0.06153109099246366,
+        "attacker": {
+            "position": [-1.6058244107424242, 0.0],
+            "control_weight": 1.8451960502805542,
+            "capture_radius": 0.05,
+            "target_running_weight": 0.4873418398085757,
+        },
+        "target": {
+            "position": [0.8399375163683034, 0.0],
+            "control_weight": 1.9487901700418313,
+            "visibility_radius": 1.0,
+        },
+        "defenders": [
+            {
+                "position": [at, 0.0],
+                "control_weight": effort,
+                "capture_radius": 0.05,
+                "visibility_radius": sight,
+                "evasion_running_weight": evasion,
+            }
+            for at, effort, sight, evasion in (
+                (-1.1873359767883636, 0.6502409652557672, 1.0, 3.403277978552436),
+                (0.5659481333498708, 2.97213185006851, math.inf, 1.858365931922464),
+                (0.5667500143437075, 6.304072142336774, 0.5, 0.3431516922042831),
+                (-0.7177403658168426, 1.0619288132644342, 0.5, 0.667291833265668),
+            )
+        ],
+    }
+)
+"""On a line, where the attacker and d2 run through each other after the game has diverged."""
+
+
+def test_passes_after_a_divergence_are_not_listed():
+    run = tadcore.simulate(LATE)
+    apart = run.position[:, 1, 0] - run.position[:, -1, 0]
+    crossed = np.flatnonzero(apart[1:] * apart[:-1] < 0)
+    assert run.times[crossed].min() > run.diverged.time  # the only times at which anybody runs through d2
+    assert np.abs(apart).min() > 0.05
+    assert run.passes == ()
+    batch = tadcore.simulate_batch(LATE, [LATE.positions] * 3, passes=True)
+    assert batch.passed.tolist() == [False] * 3
+    assert batch.diverged.all()
+
+
+def test_breakpoints_tell_divergence_from_every_other_end():
+    sc = unstable(0.34)
+    starts = np.repeat([sc.positions], 60, 0) + np.random.default_rng(1).normal(scale=0.3, size=(60, 5, 2))
+    radii = np.linspace(0.6, 6.0, 7)
+    curve = tadcore.radius_curve(sc, starts, player="d1", radii=radii, refine=True, tolerance=1e-6)
+    found = curve.breakpoints
+    marked = found.diverged_before | found.diverged_after
+    assert marked.any()
+    assert "into or out of a divergence" in repr(found)
+    for i in np.flatnonzero(marked)[:6]:
+        below, at = (
+            tadcore.simulate_batch(
+                sc, starts[found.trial[i] : found.trial[i] + 1], [radius, *sc.visibility_radii[1:].tolist()]
+            )
+            for radius in (found.radius[i] - 2e-6, found.radius[i])
+        )
+        assert (below.diverged[0], at.diverged[0]) == (found.diverged_before[i], found.diverged_after[i])
+        for lost, batch, kind in (
+            (found.diverged_before[i], below, found.kind_before[i]),
+            (found.diverged_after[i], at, found.kind_after[i]),
+        ):
+            assert kind == (0 if lost else batch.kind[0])
+    assert not ((found.diverged_before & found.diverged_after).any())
+
+
+def test_a_map_of_times_draws_what_diverges_apart(agg):
+    found = tadcore.outcome_map(unstable(0.34), x=(-3, 3, 31), y=(-2, 4, 31))
+    lost = found.dataset["diverged"].values
+    assert lost.any()
+    assert not lost.all()
+    ax = found.plot(quantity="time")
+    shown = ax.images[-1].get_array()
+    assert np.array_equal(np.ma.getmaskarray(shown) | np.isnan(np.ma.getdata(shown)), lost)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["diverged"]
+    ax.figure.canvas.draw()
+    plt.close("all")

@@ -5,6 +5,7 @@ import math
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -15,8 +16,9 @@ import tadcore
 from oracle.stiff import players
 from tadcore import Outcome, Scenario, ScenarioError, StoreError
 from tadcore.cli.app import main
+from tadcore.plotting.run.paths import PASSED
 from tadcore.sampling import Box
-from tadcore.simulation.passes import TERMINATIONS
+from tadcore.simulation.termination import TERMINATIONS
 from tadcore.statistics import incidence
 from tadcore.verification import check_steps, play_by_events, step_study
 
@@ -175,6 +177,27 @@ def test_passes_are_the_minima_that_lie_within():
                 assert (one.start, one.end) == (run.times[k], run.times[k + 1])
                 assert one.start <= one.time <= one.closest_time <= one.end
     assert met > 30
+
+
+def test_figures_show_where_the_attacker_passes(agg):
+    run = tadcore.simulate(SUICIDE)
+    (each,) = run.passes
+    k = run.times.tolist().index(each.start)
+    for draw, points in (
+        (run.plot.distances, [[each.closest_time, each.distance]]),
+        (run.plot.trajectories, [run.position[k, -1], run.position[k + 1, -1]]),
+    ):
+        ax = draw()
+        (mark,) = [line for line in ax.lines if line.get_marker() == PASSED["marker"]]
+        (point,) = mark.get_xydata()
+        low, high = np.min(points, axis=0) - 1e-12, np.max(points, axis=0) + 1e-12
+        assert ((point >= low) & (point <= high)).all()
+        (note,) = [text.get_text() for text in ax.texts if text.get_gid() == "note"]
+        assert note.endswith("between two instants, once")
+        plt.close(ax.figure)
+    ended = tadcore.simulate(SUICIDE, termination="continuous").plot.distances()
+    assert not any(text.get_gid() == "note" for text in ended.texts)
+    plt.close(ended.figure)
 
 
 def test_the_continuous_end_is_that_of_an_integrator_with_events():

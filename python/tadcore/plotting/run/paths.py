@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.passes import Pass
 from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above
 from tadcore.plotting.tools.style import look
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 LAID_UNDER: Any = (0, (4, 2))
 """Dashes of a run laid under another."""
+PASSED: Any = {"linestyle": "none", "marker": "$\u2295$", "markersize": 6.5, "markeredgewidth": 0.3, "zorder": 3.6}
+"""How a pass within a capture radius is marked: a crossed circle."""
 _AT_START = 0.015  # of the diagonal; a mark nearer than this would hide the marker of the start
 _SIZES = {"*": 7.5, "X": 5.8}
 
@@ -91,6 +94,28 @@ def _heading(ax: Axes, path: Floats, colour: str) -> None:
     )
     arrow.set_in_layout(False)
     ax.add_patch(arrow)
+
+
+def passes(ax: Axes, run: Recorded) -> None:
+    """Mark where the attacker was closest, each time it was within a capture radius between two instants only."""
+    for each in run.passes:
+        k = min(int(np.searchsorted(run.times, each.start)), len(run.times) - 2)
+        share = (each.closest_time - each.start) / (each.end - each.start)
+        whose = run.position[k : k + 2, -1]
+        point = whose[0] + share * (whose[1] - whose[0])
+        ax.plot(*point[:, None], color=colour_of(run, each), **PASSED)
+
+
+def colour_of(run: Recorded, passed: Pass) -> str:
+    """The colour of whose capture radius was passed."""
+    return look("attacker" if passed.defender is None else run.scenario.players[passed.defender]).colour
+
+
+def count_passes(run: Recorded) -> str:
+    """The passes in words, for a note; empty where there are none."""
+    many = len(run.passes)
+    times = "once" if many == 1 else f"{many} times"
+    return rf"$\oplus$ within $\sigma$ between two instants, {times}" if many else ""
 
 
 def disc(ax: Axes, run: Recorded, *, dashed: bool) -> None:

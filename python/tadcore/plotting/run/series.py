@@ -17,6 +17,8 @@ from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
 from tadcore.plotting.tools.style import COLUMN, look, note, time_label
 
+from .paths import PASSED, colour_of, count_passes
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -83,7 +85,8 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
     r"""Draw each player's distance to the attacker, with its capture radius σ and visibility radius ζ.
 
     Capture radii are dotted, a single line where all are equal; visibility radii that fall inside the picture are thin
-    lines in the player's colour and dashes.
+    lines in the player's colour and dashes. A crossed circle is the closest approach of a pass within a capture radius
+    between two instants, which ends nothing.
 
     Parameters
     ----------
@@ -122,6 +125,10 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
             rims.append((float(radius), rf"$\zeta_{{{it.symbol.strip('$')}}}$", it.colour))
     ax.set_ylim(0, top)
     _curves(ax, run, curves, rims)
+    for each in run.passes:
+        ax.plot([each.closest_time], [each.distance], color=colour_of(run, each), clip_on=False, **PASSED)
+    if run.passes:
+        note(ax, count_passes(run))
     if changes:
         mark_changes(ax, run)
     ax.set_ylabel("distance to $a$")

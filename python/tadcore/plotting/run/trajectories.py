@@ -16,7 +16,7 @@ from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
 
-from .paths import disc, name_runs, paths
+from .paths import count_passes, disc, name_runs, passes, paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,8 @@ def trajectories(
 ) -> Axes:
     r"""Draw the paths of all players, in 3-D axes when the game is in space.
 
-    A hollow marker is where a player starts, a filled one where it stands when the game ends.
+    A hollow marker is where a player starts, a filled one where it stands when the game ends. A crossed circle is where
+    the attacker was within a capture radius between two instants, which ends nothing.
 
     Parameters
     ----------
@@ -96,6 +97,7 @@ def trajectories(
         if capture_discs:
             for r in shown:
                 disc(where, r, dashed=r is full)
+        passes(where, run)
 
     draw(ax, marked=True)
     _limits(ax, dim, low, high)
@@ -114,8 +116,10 @@ def trajectories(
     elif title:
         ax.set_title(outcome_text(run))
     lost = [r for r in shown if r.diverged is not None]
-    if lost and (full is not None or not title):
-        note(ax, outcome_text(lost[0]))
+    said = [outcome_text(lost[0])] if lost and (full is not None or not title) else []
+    said += [count_passes(run)] if run.passes else []
+    if said:
+        note(ax, "; ".join(said))
     return ax
 
 

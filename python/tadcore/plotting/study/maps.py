@@ -17,6 +17,8 @@ from tadcore.scenario.model import Scenario
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
+    from numpy.typing import NDArray
 
 
 _HATCHED = 240  # grid points along an axis from which hatches are cut; finer ones would print as noise
@@ -43,6 +45,8 @@ def outcome_map(
     found: OverStarts, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
 ) -> Axes:
     """Draw how, or when, the game ends by the start of one player.
+
+    Starts whose game diverges are drawn apart, also from the times: how and when such a game ends says nothing.
 
     The other players stand where they start, with their capture discs (filled) and visibility radii (dashed, those
     that fall inside the picture); a hollow marker shows where the scenario has the player whose start varies. In space
@@ -85,7 +89,7 @@ def outcome_map(
         if legend:
             above(ax, boxes(names), columns=min(len(names), 5), columnspacing=0.7, handlelength=1.4)
     else:
-        image = ax.imshow(found.dataset["time"].values, origin="lower", extent=extent, cmap="cividis", zorder=1.0)
+        image = _times(ax, found, x, y, extent, legend=legend)
         if legend:
             bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
             bar.figure.colorbar(image, cax=bar, label="termination time")
@@ -115,18 +119,38 @@ def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[floa
     left, right, bottom, top = extent
     ax.imshow(colours[code], origin="lower", extent=(left, right, bottom, top), interpolation="nearest", zorder=1.0)
     there = [i for i in range(len(names)) if np.any(code == i)]
-    every = [slice(None, None, -(-len(points) // _HATCHED)) for points in (y, x)]
-    coarse = code[every[0], every[1]]
-    if min(coarse.shape) > 1:
-        for i in there:
-            if looks[i].hatch and np.any(coarse == i):
-                area = ax.contourf(
-                    x[every[1]], y[every[0]], np.where(coarse == i, 1.0, 0.0), levels=[0.5, 1.5], colors="none",
-                    hatches=[looks[i].hatch], zorder=1.1,
-                )  # fmt: skip
-                area.set_edgecolor((0.0, 0.0, 0.0, 0.45))
-                area.set_linewidth(0.0)
+    for i in there:
+        _hatch(ax, x, y, code == i, looks[i].hatch)
     return [names[i] for i in there]
+
+
+def _times(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[float, ...], *, legend: bool) -> AxesImage:
+    """Colour by the time of the end, and draw what diverges as in a map of outcomes."""
+    left, right, bottom, top = extent
+    lost = np.asarray(found.dataset["diverged"].values)
+    time = np.where(lost, np.nan, found.dataset["time"].values)
+    if lost.any():
+        it = outcome_look("diverged")
+        ax.imshow(
+            np.where(lost[..., None], it.fill, 1.0), origin="lower", extent=(left, right, bottom, top), zorder=0.9
+        )
+        _hatch(ax, x, y, lost, it.hatch)
+        if legend:
+            above(ax, boxes(["diverged"]))
+    return ax.imshow(time, origin="lower", extent=(left, right, bottom, top), cmap="cividis", zorder=1.0)
+
+
+def _hatch(ax: Axes, x: Floats, y: Floats, where: NDArray[np.bool_], hatch: str) -> None:
+    """Hatch the places that are marked; of a fine grid, so many as a print can show."""
+    rows, columns = (slice(None, None, -(-len(points) // _HATCHED)) for points in (y, x))
+    coarse = where[rows, columns]
+    if hatch and min(coarse.shape) > 1 and coarse.any():
+        inside = np.where(coarse, 1.0, 0.0)
+        area = ax.contourf(
+            x[columns], y[rows], inside, levels=[0.5, 1.5], colors="none", hatches=[hatch], zorder=1.1
+        )  # fmt: skip
+        area.set_edgecolor((0.0, 0.0, 0.0, 0.45))
+        area.set_linewidth(0.0)
 
 
 def draw_players(ax: Axes, found: OverStarts, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:

@@ -37,6 +37,7 @@ _DEFENDER_DASHES: tuple[Any, ...] = (
     (0, (3, 1, 1, 1, 1, 1)),
 )
 
+_NOTE = "note"
 _PAPER: Any = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
@@ -136,8 +137,12 @@ def time_label(*runs: Recorded) -> str:
 
 
 def note(ax: Axes, text: str) -> None:
-    """Write a small remark under the label of the horizontal axis, or under 3-D axes."""
+    """Write a small remark under the label of the horizontal axis, or under 3-D axes; a second one under the first."""
     plane = ax.name != "3d"
+    for there in ax.texts:
+        if there.get_gid() == _NOTE:
+            there.set_text(f"{there.get_text()}\n{text}")
+            return
     ax.annotate(
         text,
         (0.5, 0.0),
@@ -149,6 +154,7 @@ def note(ax: Axes, text: str) -> None:
         fontsize="x-small",
         color="0.3",
         annotation_clip=False,
+        gid=_NOTE,
     )
 
 

@@ -20,9 +20,9 @@ from tadcore._shared.arrays import as_index
 from tadcore.game.chattering import Chatter, chatter
 from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import Outcome
+from tadcore.game.passes import Pass
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.batch import simulate_batch
-from tadcore.simulation.passes import Pass
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.report import Check, Measurement, VerificationReport
 

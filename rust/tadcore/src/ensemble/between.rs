@@ -100,7 +100,7 @@ impl Watch {
         let (size, dim, trial) = (trials.shape.size, trials.shape.dim, trials.who[place] as usize);
         let continuous = self.between.termination == Termination::Continuous;
         let end = &mut ends[trial];
-        if !continuous && end.passed {
+        if !continuous && (end.passed || end.diverged) {
             return Ok(false);
         }
         let (start, now) = (self.state(trial, size * dim), trials.state(place));

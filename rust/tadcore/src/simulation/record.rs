@@ -164,6 +164,7 @@ pub fn simulate_with(
         advance(&step, &z, dim, &mut next, &mut attacker);
         let within = Step { k, gains: &step.gains.rows, start: &z, end: &next, dim };
         match before {
+            None if record.diverged.is_some() => {} // a pass says nothing any more
             None => within.passes(policy, &reach, &mut record.passes, cancel)?,
             Some(from) => {
                 if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {

@@ -3,22 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
-
-from tadcore.errors import ScenarioError
-
-Termination: TypeAlias = Literal["sampled", "continuous"]
-"""When a game ends: at an instant of the grid, or at the crossing of a capture radius itself."""
-
-TERMINATIONS: tuple[Termination, ...] = ("sampled", "continuous")
-
-
-def as_termination(value: object) -> Termination:
-    """Return one of the two, or raise `ScenarioError`."""
-    for known in TERMINATIONS:
-        if value == known:
-            return known
-    raise ScenarioError("termination", value, " or ".join(f'"{known}"' for known in TERMINATIONS))
 
 
 @dataclass(frozen=True)
@@ -27,7 +11,7 @@ class Pass:
 
     It is entered before the one, if any, that ends the game at the next instant: with ``termination="continuous"`` the
     game would end at the first pass. The motion within a step is known exactly, z(t_k + s) = exp(Cs) z(t_k), and so are
-    these times and the distance.
+    these times and the distance. Of a game that diverges, passes are listed up to the divergence only.
 
     Attributes
     ----------
