@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.calls import public
 from tadcore._shared.files import as_path, destination, write_whole
 from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
-from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import OutcomeKind, kind_counts
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 
 if TYPE_CHECKING:
@@ -102,8 +103,9 @@ class OutcomeMap:
         return f"OutcomeMap(start of {self.player} on {columns} × {rows} places: {counts})"
 
 
+@public
 def outcome_map(
-    sc: Scenario,
+    sc: ScenarioLike,
     player: str = "attacker",
     *,
     x: tuple[float, float, int] = (-5.0, 5.0, 201),
@@ -116,7 +118,7 @@ def outcome_map(
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game, and where the others start.
     player : str
         ``"d1"`` … ``"dn"``, ``"target"`` or ``"attacker"``.
@@ -152,7 +154,7 @@ def outcome_map(
 
     from tadcore.scenario.provenance import provenance
 
-    as_scenario(sc)
+    sc = as_scenario(sc)
     player = one_of("player", label(player), sc.players)
     (columns, rows), up = grid_of(x, y), height(sc, player, z)
     who = sc.players.index(player)

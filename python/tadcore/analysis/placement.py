@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore._shared.shares import estimate
 from tadcore.errors import ScenarioError
@@ -114,6 +115,7 @@ class ProbabilityMap:
         )
 
 
+@public
 def probability_map(
     source: Study | TrialOutcomes,
     player: str,
@@ -268,6 +270,7 @@ class BestStart:
         )
 
 
+@public
 def best_start(
     study: Study,
     player: str,

@@ -26,9 +26,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike
 from tadcore.simulation.batch import Batch
 from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
@@ -42,8 +43,9 @@ from .breakpoints import breakpoints
 from .replays import Replays, starts_of
 
 
+@public
 def radius_curve(
-    source: Scenario | Study | TrialOutcomes,
+    source: ScenarioLike | Study | TrialOutcomes,
     positions: ArrayLike | None = None,
     *,
     player: str = "d1",
@@ -60,7 +62,7 @@ def radius_curve(
 
     Parameters
     ----------
-    source : Scenario, Study or StudyResult
+    source : Scenario, path, name, Study or StudyResult
         The game, or a study whose trials are played, again or for the first time. What it varies stays varied, but for
         the radius in question.
     positions : array_like, shape (M, n + 2, dim), optional

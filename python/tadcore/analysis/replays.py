@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,6 +13,7 @@ from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
 from tadcore.scenario.quantities import component
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.starts import Rows, rows_of
 from tadcore.statistics import TrialOutcomes
@@ -19,13 +22,14 @@ from tadcore.statistics.radius import RadiusKind
 from tadcore.study.study import Study
 
 
-def starts_of(source: Scenario | Study | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
+def starts_of(source: ScenarioLike | Study | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
     """The game and the starts to play: those given, or those of a study, played or not."""
-    if not isinstance(source, Scenario):
+    if not isinstance(source, Scenario | str | os.PathLike):
         if positions is not None:
             raise ScenarioError("positions", "an array", "left out: a study brings its own starts")
         inputs = source.inputs() if isinstance(source, Study) else source.inputs
         return source.scenario, rows_of(source.scenario, inputs, source.trials)
+    source = as_scenario(source)
     if positions is None:
         raise ScenarioError("positions", MISSING, "the starts to play, of shape (M, n + 2, dim)")
     starts = as_positions(positions, (source.n + 2, source.dim), rows=True)

@@ -7,19 +7,20 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.calls import public
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
-from tadcore.game.compiled import as_scenario
-from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import component
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 from tadcore.simulation.starts import rows_of
 from tadcore.statistics.outcomes import indicators, outcome_names
 from tadcore.statistics.sobol import Distribution, Sensitivity, sobol
 
 
+@public
 def sensitivity(
-    sc: Scenario,
+    sc: ScenarioLike,
     inputs: Mapping[str, Distribution],
     *,
     points: int = 1024,
@@ -33,7 +34,7 @@ def sensitivity(
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         What holds where nothing varies.
     inputs : mapping of str to distribution
         Independent distributions of single numbers, by name: ``"attacker.position.x"``,
@@ -65,7 +66,7 @@ def sensitivity(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
-    as_scenario(sc)
+    sc = as_scenario(sc)
     if not isinstance(inputs, Mapping):
         raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
     known = (*outcome_names(sc.n, diverged=True), "time")

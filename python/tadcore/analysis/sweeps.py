@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tadcore._shared.calls import public
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.scenario.paths import expand, normal, short
@@ -140,6 +141,7 @@ class SweepResult:
         return f"SweepResult({size}{''.join(said)}{f'; {lost:,} games diverged' if lost else ''})"
 
 
+@public
 def sweep(
     study: Study,
     grid: Mapping[str, Sequence[Any]],

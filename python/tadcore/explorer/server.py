@@ -15,7 +15,7 @@ from tornado.httputil import HTTPMessageDelegate, HTTPServerRequest
 from tornado.ioloop import IOLoop
 from tornado.web import ErrorHandler
 
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .model import Explorer
 from .page import Page
@@ -56,12 +56,13 @@ class _Guarded(BokehTornado):  # type: ignore[misc]  # Bokeh is not installed ev
         return origin.lower() in {f"http://{host}" for host in self.hosts}
 
 
-def server(sc: Scenario, port: int = 0) -> BaseServer:
+def server(sc: ScenarioLike, port: int = 0) -> BaseServer:
     """A server that shows a page of its own, starting from ``sc``, to each visitor; port 0 takes a free one."""
-    Explorer(sc)  # refuse a bad scenario here and not in the first visitor's browser
+    start = as_scenario(sc)
+    Explorer(start)  # refuse a bad scenario here and not in the first visitor's browser
 
     def visit(document: Document) -> None:
-        Page(Explorer(sc)).add_to(document)
+        Page(Explorer(start)).add_to(document)
 
     sockets, port = bind_sockets(_ADDRESS, port)
     hosts = frozenset(f"{name}:{port}" for name in ("localhost", _ADDRESS))
@@ -70,12 +71,12 @@ def server(sc: Scenario, port: int = 0) -> BaseServer:
     return BaseServer(IOLoop.current(), pages.request_callback, pages)
 
 
-def serve(sc: Scenario, *, port: int = 0, browse: bool = True, ready: Callable[[str], None] = print) -> None:
+def serve(sc: ScenarioLike, *, port: int = 0, browse: bool = True, ready: Callable[[str], None] = print) -> None:
     """Serve the explorer until interrupted.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         Where to begin.
     port : int
         The port on the loopback address; 0 takes a free one.

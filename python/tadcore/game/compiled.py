@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from tadcore import _core
-from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 _KEPT = 8
 _games: OrderedDict[Hashable, _core.Game] = OrderedDict()
@@ -33,21 +33,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
 
 
-def as_scenario(sc: object) -> Scenario:
-    """Return ``sc``, or say what was given in the place of a scenario; one that was tampered with is refused."""
-    rule = "a Scenario: Scenario.from_toml(path) reads one, scenarios.load(name) too"
-    if not isinstance(sc, Scenario):
-        raise ScenarioError("scenario", sc, rule)
-    try:
-        valid = Scenario.model_validate(sc)
-    except AttributeError:  # made by __new__ alone
-        raise ScenarioError("scenario", f"a {type(sc).__name__} without fields", rule) from None
-    if valid.__dict__ != sc.__dict__:
-        raise ScenarioError("scenario", "one whose fields were overwritten", rule)
-    return sc
-
-
-def game_of(sc: Scenario) -> _core.Game:
+def game_of(sc: ScenarioLike) -> _core.Game:
     """The compiled game of a scenario, from a small cache keyed on its weights, horizon and grid."""
     arguments = _arguments(as_scenario(sc))
     key = tuple(arguments.items())

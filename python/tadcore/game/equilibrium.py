@@ -25,6 +25,7 @@ from tadcore import _core
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.text import one_of
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .compiled import game_of
 
@@ -117,14 +118,14 @@ class Equilibrium:
         )
 
 
-def solve_equilibrium(sc: Scenario) -> Equilibrium:
+def solve_equilibrium(sc: ScenarioLike) -> Equilibrium:
     """The feedback Nash equilibrium of a scenario's game on its grid.
 
     Positions and radii play no part in it: scenarios that share weights, horizon and step share the solution.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
 
     Returns
@@ -144,5 +145,6 @@ def solve_equilibrium(sc: Scenario) -> Equilibrium:
     >>> eq.P["defenders"].shape, eq.full("defenders", 0).shape
     ((1201, 4, 4), (8, 8))
     """
+    sc = as_scenario(sc)
     game = game_of(sc)
     return Equilibrium(game.equilibrium(), game.times, sc)

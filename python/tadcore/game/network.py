@@ -29,9 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore import _core
 from tadcore._shared.arrays import as_adjacency, as_index, as_positions, shape_of
 from tadcore.errors import ScenarioError
-from tadcore.scenario.model import Scenario
-
-from .compiled import as_scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 Edge: TypeAlias = tuple[str, str]
 """Who sees whom, such as ``("d1", "attacker")``."""
@@ -72,12 +70,12 @@ class VisibilityNetwork:
         return self._adjacency
 
     @classmethod
-    def from_positions(cls, sc: Scenario, positions: ArrayLike | None = None) -> VisibilityNetwork:
+    def from_positions(cls, sc: ScenarioLike, positions: ArrayLike | None = None) -> VisibilityNetwork:
         """The network of players at ``positions``, shape (n + 2, dim); the scenario's own start by default.
 
         The compiled core decides, by the arithmetic of a run: from states relative to the attacker, in doubles.
         """
-        as_scenario(sc)
+        sc = as_scenario(sc)
         at = sc.positions if positions is None else as_positions(positions, (sc.n + 2, sc.dim))
         return cls(_core.observe(at, sc.visibility_radii))
 

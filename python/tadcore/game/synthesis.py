@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
+from tadcore._shared.calls import public
 from tadcore.errors import ScenarioError
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .compiled import as_scenario, game_of
+from .compiled import game_of
 from .network import VisibilityNetwork
 
 _TERMS = {"I1": ("dQ_d", "dQ_tau", "dQ_a", "S1"), "I2": ("dQ", "S2", "S3")}
@@ -88,8 +89,9 @@ class Gains:
         return f"Gains({', '.join(self.players)}: Θ={self.theta:.6g}, {state}, gradient {self.gradient_norm:.1e})"
 
 
+@public
 def synthesize(
-    sc: Scenario,
+    sc: ScenarioLike,
     *,
     step: int,
     adjacency: ArrayLike | VisibilityNetwork,
@@ -102,7 +104,7 @@ def synthesize(
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
     step : int
         k of the instant t_k, 0 … K.
@@ -134,7 +136,7 @@ def synthesize(
     >>> bool((blind.rows == 0).all())
     True
     """
-    as_scenario(sc)
+    sc = as_scenario(sc)
     shape = (len(sc.constrained), sc.n + 1)
     seen = as_adjacency(adjacency, shape)
     k = as_index("step", step, sc.steps)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from tadcore._shared.calls import public
 from tadcore._shared.files import as_path, destination, write_whole
 from tadcore.errors import ScenarioError
 from tadcore.scenario.provenance import provenance
@@ -13,6 +14,7 @@ from .parts import Reported
 from .sections import examples, inputs, notes, origin, outcomes, times
 
 
+@public
 def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", level: float | None = None) -> Path:
     """Write a study as an HTML page.
 

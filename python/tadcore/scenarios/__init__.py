@@ -65,7 +65,11 @@ def find(source: str, folder: Path | None = None, *, field: str = "") -> Scenari
     if not isinstance(source, str):
         raise ScenarioError(field or "source", source, "the path of a file, or the name of a bundled scenario")
     path = (Path() if folder is None else as_path("folder", folder)) / source
-    if "\0" not in source and not path.exists():
+    try:
+        there = "\0" in source or path.exists()
+    except OSError as error:
+        raise ScenarioError(field or source, error.strerror, "a file, or the name of a bundled scenario") from None
+    if not there:
         if source in _NAMES:
             return load(source)
         hint = similar(source, _NAMES, cutoff=0.5)

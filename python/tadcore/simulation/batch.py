@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
-from tadcore.game.compiled import as_scenario, game_of
+from tadcore._shared.calls import public
+from tadcore.game.compiled import game_of
 from tadcore.game.outcome import Outcome, kind_counts
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .rules import capture_rows, compare, visibility_rows
 from .termination import Termination, as_termination
@@ -76,8 +77,9 @@ class Batch:
         return f"Batch({len(self):,} games: {counts}{passed})"
 
 
+@public
 def simulate_batch(
-    sc: Scenario,
+    sc: ScenarioLike,
     positions: ArrayLike,
     visibility_radii: ArrayLike | None = None,
     capture_radii: ArrayLike | None = None,
@@ -92,7 +94,7 @@ def simulate_batch(
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game; its positions are not used, its radii where none are given here.
     positions : array_like, shape (M, n + 2, dim)
         Initial positions, players ordered d1 … dn, target, attacker.
@@ -130,7 +132,7 @@ def simulate_batch(
     >>> print(batch[1])
     d1 intercepts the attacker at t = 1.395
     """
-    as_scenario(sc)
+    sc = as_scenario(sc)
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
     sight = visibility_rows(sc, visibility_radii, len(starts))
     capture = capture_rows(sc, capture_radii, len(starts))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_amount
+from tadcore._shared.calls import public
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.chattering import Chatter
 from tadcore.game.compiled import game_of
@@ -23,6 +24,7 @@ from tadcore.game.outcome import Outcome
 from tadcore.game.passes import Pass
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .termination import Termination, as_termination
 from .variants import told
@@ -230,13 +232,17 @@ def _passed(passes: tuple[Pass, ...]) -> str:
     return f"{passes[0]}{more}"
 
 
-def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0, termination: Termination = "sampled") -> Run:
+@public
+def simulate(
+    sc: ScenarioLike, *, hysteresis: float = 0.0, dwell: float = 0.0, termination: Termination = "sampled"
+) -> Run:
     """Play a scenario and record everything.
 
     Parameters
     ----------
-    sc : Scenario
-        The game and its start.
+    sc : Scenario, path or name
+        The game: a scenario, the path of its TOML file, or the name of a bundled one, as wherever a scenario is
+        taken.
     hysteresis : float
         h ≥ 0, a length. With h > 0 an edge forms at a distance of at most ζ and breaks only beyond ζ + h. The first
         network is the paper's.
@@ -277,6 +283,7 @@ def simulate(sc: Scenario, *, hysteresis: float = 0.0, dwell: float = 0.0, termi
     rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
     ending = as_termination(termination)
     continuous = ending == "continuous"
+    sc = as_scenario(sc)
     game, sight, reach = game_of(sc), sc.visibility_radii, sc.capture_radii
     record = game.simulate(sc.positions, sight, reach, **rule, continuous=continuous)
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from tadcore._shared.arrays import Floats, as_flag, as_index
+from tadcore._shared.calls import public
 from tadcore.errors import ScenarioError
-from tadcore.game.compiled import as_scenario
 from tadcore.sampling.adapters import as_sampler
 from tadcore.sampling.base import Sampler
 from tadcore.sampling.design import DESIGNS, Design
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.termination import Termination, as_termination
 
 from .collect import jobs_of
@@ -29,9 +30,10 @@ _MOST_TRIALS = 2**32  # points of the Sobol' sequence
 class Definition:
     """The scenario, what varies, how many trials and how they are drawn; `Study` has the parameters."""
 
+    @public
     def __init__(
         self,
-        sc: Scenario,
+        sc: ScenarioLike,
         vary: Mapping[str, Any],
         *,
         trials: int,
@@ -40,9 +42,7 @@ class Definition:
         termination: Termination = "sampled",
         passes: bool = False,
     ) -> None:
-        if not isinstance(sc, Scenario):
-            raise ScenarioError("sc", sc, "a tadcore.Scenario")
-        as_scenario(sc)
+        sc = as_scenario(sc)
         if not isinstance(vary, Mapping) or not vary:
             example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
             raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")

@@ -31,6 +31,7 @@ import numpy as np
 import pyarrow as pa
 
 from tadcore._shared.arrays import as_index
+from tadcore._shared.calls import public
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError, StoreError
 from tadcore.game.compiled import game_of
@@ -54,7 +55,7 @@ class Study(Definition):
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game; what does not vary is as it says.
     vary : mapping of str to sampler
         Paths of positions, visibility radii and capture radii, such as ``"attacker.position"``,
@@ -123,6 +124,7 @@ class Study(Definition):
 
         return cls(**parse_study(text, name, as_path("folder", folder)))
 
+    @public
     def run(
         self,
         *,

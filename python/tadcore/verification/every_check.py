@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from tadcore._shared.arrays import as_index
+from tadcore._shared.calls import public
 from tadcore.errors import NoEquilibriumError, ScenarioError, TadcoreError
 from tadcore.game.equilibrium import solve_equilibrium
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.run import Run, simulate
 
 from .bound.bounds import require_clarabel
@@ -28,8 +29,9 @@ from .report import Check, VerificationReport, combine, unresolved
 _MOST = 10**6
 
 
+@public
 def verify(
-    sc_or_run: Scenario | Run,
+    sc_or_run: ScenarioLike | Run,
     *,
     deviations: int = 2,
     instants: int = 20,
@@ -41,7 +43,7 @@ def verify(
 
     Parameters
     ----------
-    sc_or_run : Scenario or Run
+    sc_or_run : Scenario, path, name or Run
         A scenario, which is played first, or a run, which is checked as recorded.
     deviations : int
         Random admissible deviations of each player.
@@ -78,19 +80,18 @@ def verify(
     >>> report["nafne.value.defenders"].accepted
     True
     """
-    if not isinstance(sc_or_run, Scenario | Run):
-        raise ScenarioError("sc_or_run", sc_or_run, "a Scenario or a Run")
+    given = sc_or_run if isinstance(sc_or_run, Run) else as_scenario(sc_or_run)
     deviations = as_index("deviations", deviations, _MOST)
     instants = as_index("instants", instants, _MOST)
     starts = as_index("starts", starts, _MOST)
     seed = as_seed(seed)
     if bound:
         require_clarabel()
-    if isinstance(sc_or_run, Run) and sc_or_run.variant:
-        raise ScenarioError("sc_or_run", f"a run with {sc_or_run.variant}", "a run of the paper's game, without any")
-    sc = sc_or_run if isinstance(sc_or_run, Scenario) else sc_or_run.scenario
+    if isinstance(given, Run) and given.variant:
+        raise ScenarioError("sc_or_run", f"a run with {given.variant}", "a run of the paper's game, without any")
+    sc = given.scenario if isinstance(given, Run) else given
     try:
-        run = simulate(sc_or_run) if isinstance(sc_or_run, Scenario) else sc_or_run
+        run = given if isinstance(given, Run) else simulate(given)
         equilibrium = solve_equilibrium(sc)
     except (NoEquilibriumError, ScenarioError):
         raise

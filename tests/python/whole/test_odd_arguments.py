@@ -1,6 +1,7 @@
 """Arguments of every kind that is none: taken for what they are, or refused by name, and never a raw error."""
 
 import concurrent.futures
+import re
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,7 +11,7 @@ import xarray as xr
 from scipy import stats
 
 import tadcore
-from tadcore import Scenario, ScenarioError, Study, sampling
+from tadcore import Scenario, ScenarioError, Study, plotting, sampling
 
 SC = tadcore.scenarios.load("paper-i1").replace({"horizon": 0.5, "step": 0.05})
 STARTS = np.stack([SC.positions, SC.positions + 0.25, SC.positions - 0.25])
@@ -130,7 +131,7 @@ def test_a_masked_network_is_refused(mask):
             tadcore.VisibilityNetwork(given)
 
 
-NOT_A_SCENARIO = [None, 5, "paper-i1", b"x", [], {}, np.zeros(3), SC.model_dump(), SC.attacker, Scenario, Broken()]
+NOT_A_SCENARIO = [None, 5, "no such file", b"x", [], {}, np.zeros(3), SC.model_dump(), SC.attacker, Scenario, Broken()]
 
 
 @pytest.mark.parametrize("given", NOT_A_SCENARIO, ids=lambda given: type(given).__name__)
@@ -337,3 +338,81 @@ def test_odd_levels_and_widths_are_refused_by_name(given):
         tadcore.HalfWidth(0.1, level=given)
     with pytest.raises(ScenarioError, match=r"^width: got"):
         tadcore.HalfWidth(given)
+
+
+def test_odd_axes_are_refused_by_name(agg):
+    run = tadcore.simulate(SC)
+    found = tadcore.outcome_map(SC, x=(0, 1, 2), y=(0, 1, 2))
+    for given in (5, "ax", [], np.array([plt.gca(), plt.gca()]), plt.gcf(), plt):
+        for draw in (
+            run.plot.trajectories,
+            run.plot.distances,
+            run.plot.theta,
+            run.plot.visibility,
+            found.plot,
+            lambda ax: plotting.compare(run, run, ax=ax),
+        ):
+            with pytest.raises(ScenarioError, match=r"ax: got .* must be axes of Matplotlib"):
+                draw(ax=given)
+    for draw in (run.plot.network, run.plot.gains):
+        with pytest.raises(ScenarioError, match="axes: got"):
+            draw([plt.gca(), "ax"])
+    plt.close("all")
+
+
+def test_flags_are_true_or_false(agg):
+    run = tadcore.simulate(SC)
+    study = Study(SC, {"attacker.position": sampling.Box(-1, 1)}, trials=2)
+    for given in (np.array([True, False]), "yes", 1, None, []):
+        for use, name in (
+            (lambda x: run.plot.trajectories(zoom=x), "zoom"),
+            (lambda x: run.plot.gains(changes=x), "changes"),
+            (lambda x: tadcore.verify(run, bound=x), "bound"),
+            (lambda x: tadcore.outcome_map(SC, x=(0, 1, 2), y=(0, 1, 2), progress=x), "progress"),
+            (lambda x: tadcore.radius_curve(study, player="d1", radii=[2.0], refine=x), "refine"),
+        ):
+            with pytest.raises(ScenarioError, match=rf"{name}: got .*, must be True or False"):
+                use(given)
+    assert run.plot.trajectories(zoom=np.False_).has_data()
+    plt.close("all")
+
+
+def test_an_option_that_does_not_exist_is_answered_with_the_nearest():
+    run = tadcore.simulate(SC)
+    study = Study(SC, {"attacker.position": sampling.Box(-1, 1)}, trials=2)
+    play = tadcore.simulate
+    for use, said in (
+        (lambda: play(SC, terminaton="x"), "simulate() has no option 'terminaton'; did you mean termination?"),
+        (lambda: run.plot.controls(axes="y"), "controls() has no option 'axes'; did you mean axis?"),
+        (lambda: Study(SC, {}, trails=5), "Study() has no option 'trails'; did you mean trials?"),
+        (lambda: study.run(thread=1), "Study.run() has no option 'thread'; did you mean threads?"),
+        (lambda: tadcore.verify(run, deviation=1), "did you mean deviations?"),
+        (lambda: play(SC, colour=1), "simulate() has no option 'colour'; it takes sc, hysteresis, dwell, termination"),
+    ):
+        with pytest.raises(TypeError, match=re.escape(said)):
+            use()
+
+
+def test_a_path_and_a_name_are_scenarios(tmp_path, monkeypatch):
+    (tmp_path / "mine.toml").write_text(SC.to_toml(), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    known = tadcore.scenarios.load("paper-i1")
+    vary = {"attacker.position": sampling.Box(-1, 1)}
+    for given, meant in (("paper-i1", known), ("mine.toml", SC), (tmp_path / "mine.toml", SC)):
+        assert tadcore.simulate(given).scenario == meant
+        assert tadcore.solve_equilibrium(given).times[-1] == meant.horizon
+        assert len(tadcore.simulate_batch(given, [meant.positions])) == 1
+        assert Study(given, vary, trials=1).scenario == meant
+        assert tadcore.outcome_map(given, x=(0, 1, 2), y=(0, 1, 2)).scenario == meant
+        assert tadcore.radius_curve(given, [meant.positions], radii=[3.0]).trials == 1
+        assert tadcore.verification.step_study(given, halvings=0).steps[0] == meant.step
+        assert tadcore.synthesize(given, step=0, adjacency=tadcore.VisibilityNetwork.from_positions(given)).players
+    with pytest.raises(ScenarioError, match="did you mean paper-i"):
+        tadcore.simulate("paper-i")
+    with pytest.raises(ScenarioError, match="from_toml_string reads a text"):
+        tadcore.simulate(SC.to_toml())
+    with pytest.raises(ScenarioError, match="a file that exists"):
+        tadcore.simulate(tmp_path / "none.toml")
+    for given in ("x" * 5000, "a\0b", "."):
+        with pytest.raises(ScenarioError):
+            tadcore.simulate(given)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from tadcore._shared.calls import public
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@public
 def compare(
     run_a: Recorded,
     run_b: Recorded,

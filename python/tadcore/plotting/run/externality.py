@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.calls import public
 from tadcore.game.externality import control_jumps
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
@@ -21,6 +22,7 @@ MAX_NAMED = 12
 _ROOM = 0.6  # inches that the edges of one change take; in narrower places they stand upright
 
 
+@public
 def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
     """Draw how far each player's control jumps at every change of the network.
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from tadcore._shared.calls import public
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
-from tadcore.plotting.tools.axes import above, as_run, new_panels
+from tadcore.plotting.tools.axes import above, as_panels, as_run, new_panels
 from tadcore.plotting.tools.style import look, symbol, time_label
 
 from .series import MAX_VERTICALS, mark_changes, span
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@public
 def gains(
     run: Recorded, axes: Axes | NDArray[Any] | None = None, *, columns: int = 1, changes: bool = True
 ) -> Axes | NDArray[Any]:
@@ -50,7 +51,7 @@ def gains(
     observers = run.scenario.constrained
     if axes is None:
         axes = new_panels(len(observers), columns, page_from=2, row=1.15, rest=0.6, sharex=True)
-    panels: list[Axes] = list(np.asarray(axes, dtype=object).ravel())
+    panels = as_panels(axes)
     entries = run.scenario.players[:-1]
     thin = len(run.network_changes) > MAX_VERTICALS
     for i, (ax, observer) in enumerate(zip(panels, observers, strict=False)):

@@ -10,10 +10,11 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.calls import public
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
-from tadcore.plotting.tools.axes import as_run, new_panels
+from tadcore.plotting.tools.axes import as_panels, as_run, new_panels
 from tadcore.plotting.tools.style import look, note, outcome_text
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ _NEW: dict[str, Any] = {"color": "black", "linewidth": 1.9, "linestyle": "-", "m
 _LOST: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": ":", "mutation_scale": 7, "zorder": 1.8}
 
 
+@public
 def network(
     run: Recorded, axes: Axes | NDArray[Any] | None = None, *, max_panels: int = 12, columns: int = 3
 ) -> Axes | NDArray[Any]:
@@ -60,7 +62,7 @@ def network(
     if axes is None:
         count = max(min(len(changes), as_index("max_panels", max_panels, 1000, least=1)), 1)
         axes = new_panels(count, columns, page_from=4, row=0.22, rest=0.0, square=True)
-    panels = list(np.asarray(axes, dtype=object).ravel())
+    panels = as_panels(axes)
     shown = min(len(changes), max_panels, len(panels))
     edges: set[Edge] = set()
     for k in range(shown):

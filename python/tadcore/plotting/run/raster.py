@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 
+from tadcore._shared.calls import public
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
@@ -23,6 +24,7 @@ MAX_ROWS = 24
 _ROW = 9.0  # points that one row with a name needs
 
 
+@public
 def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw a raster of the visibility network: a row per edge, a bar wherever the edge is there.
 

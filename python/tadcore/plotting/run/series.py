@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.calls import public
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
@@ -32,6 +33,7 @@ _TERMS = {
 }
 
 
+@public
 def controls(
     run: Recorded,
     axis: str = "x",
@@ -81,6 +83,7 @@ def controls(
     return ax
 
 
+@public
 def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw each player's distance to the attacker, with its capture radius σ and visibility radius ζ.
 
@@ -135,6 +138,7 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
     return ax
 
 
+@public
 def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
     r"""Draw the synthesis objective :math:`\Theta` and the squared norms that make it up, on a logarithmic scale.
 

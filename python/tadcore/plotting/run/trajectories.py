@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.calls import public
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
-from tadcore.plotting.tools.axes import as_run, new_axes
+from tadcore.plotting.tools.axes import as_axes, as_run, new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
@@ -35,6 +36,7 @@ class _Mark:
     point: Floats
 
 
+@public
 def trajectories(
     run: Recorded,
     ax: Axes | None = None,
@@ -124,7 +126,7 @@ def trajectories(
 
 
 def _axes(ax: Axes | None, dim: int, low: Floats, high: Floats) -> Axes:
-    if ax is not None and (ax.name == "3d") != (dim == 3):
+    if ax is not None and (as_axes(ax).name == "3d") != (dim == 3):
         raise ValueError(f"a game in {dim} dimensions needs {dim}-D axes, got axes of kind {ax.name!r}")
     if dim == 3:
         return new_axes(ax, COLUMN, 0.78 * COLUMN, projection="3d")

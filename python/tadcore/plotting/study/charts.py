@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from tadcore._shared.calls import public
 from tadcore._shared.shares import estimate, percent
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 _ROW = 0.27  # inches for each row of a chart of rows
 
 
+@public
 def outcome_probabilities(found: OutcomeProbabilities, ax: Axes | None = None) -> Axes:
     """Draw each outcome's probability with its interval, one row each, defenders under interceptions.
 
@@ -55,6 +57,7 @@ def outcome_probabilities(found: OutcomeProbabilities, ax: Axes | None = None) -
     return ax
 
 
+@public
 def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True, bands: bool = True) -> Axes:
     """Draw the cumulative incidence of the outcomes over time.
 
@@ -110,6 +113,7 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
     return ax
 
 
+@public
 def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, str] = ("A", "B")) -> Axes:
     """Draw the paired difference of each outcome's probability with its interval.
 
@@ -144,6 +148,7 @@ def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, s
     return ax
 
 
+@public
 def radius_curve(
     curve: RadiusCurve,
     ax: Axes | None = None,
@@ -221,6 +226,7 @@ def radius_curve(
     return ax
 
 
+@public
 def sensitivity(found: Sensitivity, output: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw first-order and total indices of one quantity, the inputs with the largest total at the top.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.outcomes import input_label, outcome_look
 from tadcore.plotting.tools.style import COLUMN
@@ -21,6 +22,7 @@ _FILLED = 25.0  # trials that a cell has on average, where the number of cells i
 _MOST_CELLS = 60  # along an axis
 
 
+@public
 def outcomes_over(
     result: TrialOutcomes,
     x: str,

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.patches import Circle
 
 from tadcore._shared.arrays import Floats
+from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.outcomes import boxes, outcome_look
@@ -41,6 +42,7 @@ class OverStarts(Protocol):
         """``kind``, ``defender`` and ``time`` over (y, x), or ``estimate`` and its intervals over (outcome, y, x)."""
 
 
+@public
 def outcome_map(
     found: OverStarts, ax: Axes | None = None, *, quantity: str = "outcome", radii: bool = True, legend: bool = True
 ) -> Axes:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.style import COLUMN, symbol
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 _QUANTITIES = ("estimate", "low", "high", "band_low", "band_high")
 
 
+@public
 def probability_map(
     found: OverStarts,
     ax: Axes | None = None,

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore.plotting.tools.axes import above, new_axes, new_panels
+from tadcore._shared.calls import public
+from tadcore.plotting.tools.axes import above, as_panels, new_axes, new_panels, root_figure
 from tadcore.plotting.tools.outcomes import boxes, input_label, parts_of, stack
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.statistics import TrialOutcomes, outcome_names
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@public
 def outcomes_by_input(
     result: TrialOutcomes, name: str, ax: Axes | None = None, *, ranges: int = 10, legend: bool = True
 ) -> Axes:
@@ -77,6 +79,7 @@ def outcomes_by_input(
     return ax
 
 
+@public
 def outcomes_by_inputs(
     result: TrialOutcomes, names: Sequence[str], axes: NDArray[Any] | None = None, *, ranges: int = 10
 ) -> NDArray[Any]:
@@ -105,17 +108,19 @@ def outcomes_by_inputs(
     """
     if axes is None:
         axes = new_panels(len(names), 3, page_from=1, row=1.6, rest=0.4, sharey=True)
-    if axes.size < len(names):
-        raise ValueError(f"{len(names)} inputs need as many axes, got {axes.size}")
-    for i, ax in enumerate(axes.flat):
+    panels = as_panels(axes)
+    if len(panels) < len(names):
+        raise ValueError(f"{len(names)} inputs need as many axes, got {len(panels)}")
+    for i, ax in enumerate(panels):
         if i < len(names):
             outcomes_by_input(result, names[i], ax, ranges=ranges, legend=False)
-            ax.set_ylabel("share of trials" if ax.get_subplotspec().is_first_col() else "")
+            place = ax.get_subplotspec()
+            ax.set_ylabel("share of trials" if place is None or place.is_first_col() else "")
         else:
             ax.set_axis_off()
     lost = diverged_of(result) is not None
     shown = boxes(parts_of(outcome_names(result.scenario.n, diverged=lost)))
-    axes.flat[0].figure.legend(handles=shown, loc="outside upper center", ncols=min(len(shown), 8), frameon=False)
+    root_figure(panels[0]).legend(handles=shown, loc="outside upper center", ncols=min(len(shown), 8), frameon=False)
     return axes
 
 

@@ -64,10 +64,25 @@ def as_run(run: object, field: str = "run") -> None:
         raise ScenarioError(field, run, "a Run, as tadcore.simulate returns it")
 
 
+def as_axes(ax: object, field: str = "ax") -> Axes:
+    """Refuse what are no axes of Matplotlib."""
+    from matplotlib.axes import Axes
+
+    if isinstance(ax, Axes):
+        return ax
+    one = ": one of the array" if isinstance(ax, np.ndarray | list | tuple) else ""
+    raise ScenarioError(field, ax, f"axes of Matplotlib, as plt.subplots returns them{one}")
+
+
+def as_panels(axes: Any) -> list[Axes]:
+    """The axes of an array of them, row by row; refuse what holds anything else."""
+    return [as_axes(ax, "axes") for ax in np.asarray(axes, dtype=object).ravel()]
+
+
 def new_axes(ax: Axes | None, width: float, height: float, *, projection: str | None = None) -> Axes:
     """Return ``ax``, or the axes of a new figure of this size in inches."""
     if ax is not None:
-        return ax
+        return as_axes(ax)
     return new_figure(width, height).add_subplot(projection=projection)
 
 

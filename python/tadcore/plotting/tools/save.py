@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from tadcore._shared.calls import public
 from tadcore._shared.files import as_path, written
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ _ENGINES = ("xelatex", "lualatex", "pdflatex")
 _UNDATED: dict[str, Any] = {"pdf": {"metadata": {"CreationDate": None}}, "svg": {"metadata": {"Date": None}}}
 
 
+@public
 def save(
     fig: Figure, stem: str | os.PathLike[str], *, formats: Iterable[str] = ("png", "pdf"), dpi: float = 300
 ) -> list[Path]:

@@ -31,11 +31,10 @@ from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import MISSING, ScenarioError
-from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 
@@ -90,13 +89,13 @@ class ThetaBound:
 
 
 def theta_bound(
-    sc: Scenario, *, step: int, adjacency: ArrayLike | VisibilityNetwork, blocks: bool = False
+    sc: ScenarioLike, *, step: int, adjacency: ArrayLike | VisibilityNetwork, blocks: bool = False
 ) -> ThetaBound:
     """Bound Θ from below at instant t_k under a network, and compare it with the gains of `tadcore.synthesize`.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
     step : int
         k of the instant t_k, 0 … K.
@@ -127,7 +126,7 @@ def theta_bound(
     True
     """
     require_clarabel()
-    as_scenario(sc)
+    sc = as_scenario(sc)
     seen = as_adjacency(adjacency, (len(sc.constrained), sc.n + 1))
     k = as_index("step", step, sc.steps)
     m = matrices_of(sc)

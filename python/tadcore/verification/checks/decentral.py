@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
-from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.matrices import Matrices, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
@@ -170,7 +170,7 @@ def _lowest(value: Callable[[float], float]) -> float:
 
 
 def decentralise(
-    sc: Scenario,
+    sc: ScenarioLike,
     *,
     step: int,
     adjacency: ArrayLike | VisibilityNetwork,
@@ -182,7 +182,7 @@ def decentralise(
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
     step : int
         k of the instant t_k, 0 … K.
@@ -208,7 +208,7 @@ def decentralise(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
-    as_scenario(sc)
+    sc = as_scenario(sc)
     seen = as_adjacency(adjacency, (len(sc.constrained), sc.n + 1))
     k = as_index("step", step, sc.steps)
     delay = as_index("delay", delay, 1000)

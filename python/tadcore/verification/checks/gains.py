@@ -17,10 +17,9 @@ from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tadcore._shared.arrays import Floats
-from tadcore.game.compiled import as_scenario
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.synthesis import synthesize
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.run import Run
 from tadcore.verification.bound.bounds import ThetaBound, bound_theta, require_clarabel
 from tadcore.verification.oracle.draws import generator
@@ -202,12 +201,12 @@ class CertificateRates:
     starts: dict[str, int]
 
 
-def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed: int = 0) -> CertificateRates:
+def certificate_rates(sc: ScenarioLike, *, trials: int = 200, starts: int = 0, seed: int = 0) -> CertificateRates:
     """Draw instants and networks of one game at random and count the instants at which each claim holds.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
     trials : int
         How many pairs; instants are uniform on the grid, networks have a density uniform in [0, 1].
@@ -221,7 +220,7 @@ def certificate_rates(sc: Scenario, *, trials: int = 200, starts: int = 0, seed:
     CertificateRates
         The counts.
     """
-    as_scenario(sc)
+    sc = as_scenario(sc)
     m = matrices_of(sc)
     values = m.values(solve_equilibrium(sc).P)
     shape = (len(sc.constrained), sc.n + 1)

@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import as_index
 from tadcore.game.chattering import Chatter, chatter
-from tadcore.game.compiled import as_scenario
 from tadcore.game.outcome import Outcome
 from tadcore.game.passes import Pass
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.report import Check, Measurement, VerificationReport
@@ -100,19 +100,19 @@ class Refinement:
     undecided: np.ndarray
 
 
-def refined(sc: Scenario, halvings: int, *, least: int = 0) -> list[Scenario]:
+def refined(sc: ScenarioLike, halvings: int, *, least: int = 0) -> list[Scenario]:
     """The scenario at δ, δ/2, δ/4, …: ``halvings`` + 1 of them."""
-    as_scenario(sc)
+    sc = as_scenario(sc)
     count = as_index("halvings", halvings, 20, least=least)
     return [sc, *(sc.replace(step=sc.horizon / (sc.steps * 2**i)) for i in range(1, count + 1))]
 
 
-def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:
+def step_study(sc: ScenarioLike, *, halvings: int = 2) -> StepStudy:
     """Play a scenario at δ, δ/2, δ/4, ….
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The scenario; its step is the first.
     halvings : int
         How many times the step is halved.
@@ -132,12 +132,14 @@ def step_study(sc: Scenario, *, halvings: int = 2) -> StepStudy:
     )
 
 
-def refine_batch(sc: Scenario, positions: ArrayLike, *, halvings: int = 2, threads: int | None = None) -> Refinement:
+def refine_batch(
+    sc: ScenarioLike, positions: ArrayLike, *, halvings: int = 2, threads: int | None = None
+) -> Refinement:
     """Play many games at δ, δ/2, δ/4, … and count those that end otherwise.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The game.
     positions : array_like, shape (M, n + 2, dim)
         Initial positions, as in `tadcore.simulate_batch`; M is at least one.

@@ -23,10 +23,10 @@ from scipy.optimize import brentq
 
 from tadcore import _core
 from tadcore._shared.arrays import Floats
-from tadcore.game.compiled import as_scenario
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
 from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .circles import Circles, Loops, flow
 from .plays import Event, EventPlay, Slide
@@ -36,12 +36,12 @@ _EVENTS_PER_STEP = 40
 _ROOT = 1e-13
 
 
-def play_by_events(sc: Scenario) -> EventPlay:
+def play_by_events(sc: ScenarioLike) -> EventPlay:
     """Play a scenario in continuous time, from event to event.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The scenario. Its step is the step of the feedback; halve it to see the times converge, at second order.
 
     Returns

@@ -16,7 +16,7 @@ import numpy as np
 from tadcore._shared.arrays import Floats
 from tadcore._shared.shares import share
 from tadcore.game.network import Edge
-from tadcore.scenario.model import Scenario
+from tadcore.scenarios.given import ScenarioLike
 from tadcore.simulation.run import Run, simulate
 from tadcore.verification.checks.steps import refined
 
@@ -78,12 +78,12 @@ class SlidingStudy:
         return "\n".join(lines)
 
 
-def sliding_study(sc: Scenario, *, halvings: int = 3) -> SlidingStudy:
+def sliding_study(sc: ScenarioLike, *, halvings: int = 3) -> SlidingStudy:
     """Play a scenario in continuous time and at δ, δ/2, δ/4, …, and compare each sliding mode with the chattering.
 
     Parameters
     ----------
-    sc : Scenario
+    sc : Scenario, path or name
         The scenario; its step is the first.
     halvings : int
         How many times the step is halved.
