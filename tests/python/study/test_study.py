@@ -232,7 +232,7 @@ def test_paths_that_cannot_vary_are_refused_with_the_way_to_do_it(path, words):
         ({"design": "halton"}, "design"),
         ({"vary": {}}, "vary"),
         ({"vary": []}, "vary"),
-        ({"sc": "paper-i1"}, "sc"),
+        ({"sc": "paper-i"}, "scenario"),
     ],
 )
 def test_bad_arguments_are_refused_by_name(options, field):
