@@ -182,7 +182,7 @@ def as_sampler(field: str, value: Any) -> Sampler:
         return Quantiles(value)
     if hasattr(value, "rvs"):
         return Variates(value)
-    if hasattr(value, "resample"):
+    if hasattr(value, "resample") and hasattr(type(value), "pdf"):  # a table resamples too, by time
         return Resampled(value)
     if callable(value) and not isinstance(value, type):
         if not _takes(value, 2):

@@ -270,8 +270,11 @@ def test_what_a_callable_must_not_return_is_named(function, tmp_path):
     assert not list(tmp_path.glob("store/part*"))
 
 
+TABLES = [pd.Series([1.0, 2.0]), pd.DataFrame([[1.0]]), pd.DataFrame({"pdf": [1.0]}), xr.DataArray([[1.0, 2.0]])]
+
+
 @pytest.mark.parametrize(
-    "given", [lambda: 1, lambda rng: 1, int, float, dict, sampling.Box, object(), "normal", 5, None]
+    "given", [lambda: 1, lambda rng: 1, int, float, dict, sampling.Box, object(), "normal", 5, None, *TABLES]
 )
 def test_what_is_no_sampler_is_refused(given):
     with pytest.raises(ScenarioError, match=r"^vary\["):
