@@ -112,6 +112,20 @@ def minima(run):
     return found
 
 
+@pytest.mark.parametrize("step", [0.5, 1.0])
+def test_no_graze_is_lost_between_events(step):
+    """A suicidal attacker keeps to the x-axis; who hardly moves intercepts it if it stands nearer to that than σ."""
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        place, aside = float(rng.uniform(-1.5, 1.0)), float(rng.uniform(-0.02, 0.02))
+        if 0.0095 < abs(aside) < 0.0105:
+            continue
+        sc = SUICIDE.replace({"step": step, "d1.position": [place, aside]})
+        expected = "intercepted" if abs(aside) < 0.01 else "captured"
+        assert play_by_events(sc).outcome.kind == expected, (place, aside)
+        assert tadcore.simulate(sc, termination="continuous").outcome.kind == expected, (place, aside)
+
+
 def by_events(run):
     """Outcome in continuous time: each step integrated from its recorded start, its events found by SciPy.
 

@@ -142,7 +142,7 @@ class _Play:
         f = self.inside() * np.stack([self.circles.values(x) for x in z])
         slope = self.inside() * np.stack([self.circles.slopes(x, C) for x in z])
         # outwards through the circle: f grows past zero; or a graze, with a maximum inside
-        graze = (slope[:-1] > 0) & (slope[1:] < 0) & (f[1:] + 2.0 * nodes[1] * slope[:-1] > 0)
+        graze = (slope[:-1] > 0) & (slope[1:] < 0) & (f[:-1] + 2.0 * nodes[1] * slope[:-1] > 0)
         best, met = h, None
         for part, c in np.argwhere((f[1:] > 0) | graze).tolist():
             if nodes[part] < best:
