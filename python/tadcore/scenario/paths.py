@@ -20,11 +20,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, overload
 
 from tadcore.errors import ScenarioError
 
 Value = TypeVar("Value")
+Other = TypeVar("Other")
 
 AXES = "xyz"
 _EXAMPLES = "a path such as attacker.position or d1.visibility_radius"
@@ -65,6 +66,16 @@ class ByPath(dict[str, Value]):
 
     def __contains__(self, key: object) -> bool:
         return super().__contains__(normal(key) if isinstance(key, str) else key)
+
+    @overload
+    def get(self, key: str, default: None = None, /) -> Value | None: ...
+    @overload
+    def get(self, key: str, default: Value, /) -> Value: ...
+    @overload
+    def get(self, key: str, default: Other, /) -> Value | Other: ...
+    def get(self, key: str, default: Any = None, /) -> Any:
+        """As of a dict, by any spelling."""
+        return super().get(normal(key) if isinstance(key, str) else key, default)
 
 
 def is_owner(path: str) -> bool:

@@ -6,7 +6,7 @@ import pytest
 import tadcore
 from tadcore import ScenarioError
 from tadcore.sampling import Box
-from tadcore.scenario.paths import beyond, expand, is_owner, label, normal, short
+from tadcore.scenario.paths import ByPath, beyond, expand, is_owner, label, normal, short
 
 SC = tadcore.scenarios.load("paper-i1")
 
@@ -86,3 +86,16 @@ def test_inputs_by_any_spelling_are_the_same_games():
     rows = [rows_of(SC, {path: [1.5, 2.5]}, 2) for path in ("d2.visibility_radius", "defenders[1].visibility_radius")]
     assert (rows[0].visibility_radii == rows[1].visibility_radii).all()
     assert rows[0].visibility_radii[:, 1].tolist() == [1.5, 2.5]
+
+
+def test_a_dict_by_path_finds_every_spelling_in_every_way():
+    found = ByPath({"defenders.0.visibility_radius": 2.0, "attacker.position.x": None})
+    for spelling in ("d1.visibility_radius", "defenders[0].visibility_radius", "defenders.0.visibility_radius"):
+        assert spelling in found
+        assert found[spelling] == found.get(spelling) == found.get(spelling, 7.0) == 2.0
+    assert found.get("attacker.position.x", 7.0) is None
+    for stranger in ("d2.visibility_radius", 5, None):
+        assert stranger not in found
+        assert (found.get(stranger), found.get(stranger, 7.0)) == (None, 7.0)
+        with pytest.raises(KeyError):
+            found[stranger]
