@@ -49,7 +49,9 @@ def compare(starts: Floats, capture: Floats, sight: Floats, n: int) -> None:
     refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")
     extents = extents_of(starts)
     bad = ~can_be_told(sight, extents[:, None])
-    refuse_where("visibility_radii", np.broadcast_to(sight, bad.shape), bad, too_far(float(extents.max(initial=0.0))))
+    if bad.any():
+        farthest = float(extents[bad.any(axis=1)].max())
+        refuse_where("visibility_radii", np.broadcast_to(sight, bad.shape), bad, too_far(farthest))
 
 
 def extents_of(starts: Floats) -> Floats:

@@ -126,6 +126,10 @@ def test_rows_of_batches_and_studies_are_refused_before_anything_runs():
     rows[1, -1, 0] = -1e17
     with pytest.raises(ScenarioError, match=r"visibility_radii\[1, 0\]: got 2\.0, must be at least 1e-12"):
         tadcore.simulate_batch(sc, rows)
+    rows[0, -1, 0] = 1e18  # farther, and everybody sees without limit there
+    sight = np.array([[math.inf, math.inf], [2.0, math.inf], [2.0, math.inf]])
+    with pytest.raises(ScenarioError, match=r"visibility_radii\[1, 0\]: got 2\.0, must be .* along an axis \(1e\+17\)"):
+        tadcore.simulate_batch(sc, rows, visibility_radii=sight)
     study = tadcore.Study(sc, {"attacker.position.x": tadcore.sampling.Choice([5.0, 1e17])}, trials=50, seed=1)
     with pytest.raises(ScenarioError, match=r"defenders\.0\.visibility_radius, trial \d+: got 2\.0, must be at least"):
         study.run()
