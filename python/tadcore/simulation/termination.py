@@ -15,6 +15,6 @@ TERMINATIONS: tuple[Termination, ...] = ("sampled", "continuous")
 def as_termination(value: object) -> Termination:
     """Return one of the two, or raise `ScenarioError`."""
     for known in TERMINATIONS:
-        if value == known:
+        if isinstance(value, str) and value == known:
             return known
     raise ScenarioError("termination", value, " or ".join(f'"{known}"' for known in TERMINATIONS))

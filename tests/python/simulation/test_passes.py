@@ -276,6 +276,8 @@ def test_what_is_neither_end_is_refused():
         with pytest.raises(ScenarioError) as caught:
             play(SUICIDE, termination="euler")
         assert caught.value.field == "termination"
+        with pytest.raises(ScenarioError, match=r"^termination: "):
+            play(SUICIDE, termination=np.array(TERMINATIONS))
 
 
 def test_a_step_study_is_not_stable_where_a_crossing_changes_the_outcome():
