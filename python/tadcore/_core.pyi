@@ -5,7 +5,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "__version__", "grid_times", "observe", "simd"]
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "Stop", "__version__", "grid_times", "observe", "simd"]
 
 __version__: str
 
@@ -77,6 +77,7 @@ class Game:
         continuous: bool = False,
         passes: bool = False,
         threads: int | None = None,
+        stop: Stop | None = None,
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Kind, defender, time, whether the game diverged, and whether it passed within a radius between instants."""
     def save_table(self) -> bytes:
@@ -86,6 +87,14 @@ class Game:
     def load_table(self, table: bytes) -> int:
         """Add the entries of a saved table; ValueError for one that is not this game's. The entries held now."""
     def table(self) -> dict[str, int]: ...
+
+@final
+class Stop:
+    """A flag by which one thread ends what others compute: each computation that has it raises KeyboardInterrupt."""
+
+    def __new__(cls) -> Stop: ...
+    def set(self) -> None: ...
+    def is_set(self) -> bool: ...
 
 @final
 class Equilibrium:

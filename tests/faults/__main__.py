@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from bench import CHUNK, INSIDE, TRIALS, Bench, WrongError, child, insist, ipc, parts, refused, study
+from bench import CHUNK, INSIDE, TRIALS, Bench, WrongError, child, insist, ipc, part, parts, refused, study
 
 import tadcore
 from tadcore import StoreError
@@ -93,7 +93,7 @@ def disk_full(b):
 
 def read_only(b):
     folder = b.fresh("read-only", copy=True)
-    (folder / "part-000007.parquet").unlink()
+    (folder / part(7)).unlink()
     (folder / "_store.lock").unlink(missing_ok=True)
     folder.chmod(0o555)
     b.place.chmod(0o755)

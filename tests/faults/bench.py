@@ -15,16 +15,33 @@ sys.path.insert(0, str(ROOT / "tests" / "python"))
 import pyarrow as pa  # noqa: E402
 
 import tadcore  # noqa: E402
-from study_cases import CHUNK, parts, study  # noqa: E402
+import tadcore.study.parts  # noqa: E402
+from study_cases import CHUNK, part, parts, study  # noqa: E402
 from tadcore import StoreError, WorkerError  # noqa: E402
 
-__all__ = ["CHUNK", "INSIDE", "TRIALS", "Bench", "WrongError", "child", "insist", "ipc", "parts", "refused", "study"]
+__all__ = [
+    "CHUNK",
+    "INSIDE",
+    "TRIALS",
+    "Bench",
+    "WrongError",
+    "child",
+    "insist",
+    "ipc",
+    "part",
+    "parts",
+    "refused",
+    "study",
+]
 
+tadcore.study.parts.GROUP = 1  # a part for every chunk, so that a fault meets one among many
 TRIALS = 60 * CHUNK + 123
 RUN = """
 import sys
 import tadcore
 from study_cases import study
+from tadcore.study import parts
+parts.GROUP = 1
 print("ready", flush=True)
 try:
     study({trials}).run(store=sys.argv[1], threads=1)

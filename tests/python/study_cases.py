@@ -66,6 +66,12 @@ def lethal(rng, size):
     return ring(rng, size)
 
 
+def part(chunk, rows=CHUNK):
+    """The name of the part of one chunk, where a part has no more."""
+    first = chunk * CHUNK
+    return f"part-{first:010d}-{first + rows:010d}.parquet"
+
+
 def parts(folder):
     """The bytes of every part of a store, by name."""
     return {path.name: path.read_bytes() for path in sorted(Path(folder).glob("part-*.parquet"))}

@@ -95,7 +95,7 @@ def written(path: str | os.PathLike[str]) -> Iterator[Path]:
             _pour(content, _opened(name) if number is None else os.dup(number))
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
+def write_whole(path: str | os.PathLike[str], content: str | bytes | memoryview) -> None:
     """Write a file that appears whole or not at all; see `written`."""
     with written(path) as partial:
         partial.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

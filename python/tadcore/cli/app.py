@@ -21,6 +21,7 @@ from .maps import draw_map, write_report
 from .options import FAILED, set_backend_aside
 from .paper import reproduce
 from .runs import scenarios, simulate, validate
+from .store import store
 from .study import study
 from .terminal import complain, say
 from .verify import verify
@@ -78,6 +79,7 @@ for name, command, summary in (
     ("verify", verify, "Check the paper's theorems on a scenario."),
 ):
     app.command(name=name, short_help=summary)(command)
+app.add_typer(store, name="store", short_help="Look after the folder of a study.")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

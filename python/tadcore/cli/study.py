@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import enum
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,14 @@ from .terminal import complain, say
 _INTERRUPTED = 130
 
 
+class Keeping(enum.StrEnum):
+    """What a study keeps of every trial."""
+
+    ALL = "all"
+    OUTCOMES = "outcomes"
+    COUNTS = "counts"
+
+
 def study(
     file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")],
     store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
@@ -23,6 +32,10 @@ def study(
     table: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Keep the game's table of gains there: read before, written after."),
+    ] = None,
+    keep: Annotated[
+        Keeping | None,
+        typer.Option(help="What is kept of every trial; by default what the study file says, or all."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
@@ -33,6 +46,7 @@ def study(
       tadcore study my-study.toml --store out
       tadcore study my-study.toml --store out --threads 4 --no-progress
       tadcore study my-study.toml --store out --table paper-i1.table
+      tadcore study my-study.toml --store out --keep counts
 
     Run again, it resumes from what DIR holds. A study file:
 
@@ -58,7 +72,9 @@ def study(
     if resume:
         Manifest.read(store)
     try:
-        result = wanted.run(progress=progress, store=store, threads=threads, table=table)
+        result = wanted.run(
+            progress=progress, store=store, threads=threads, table=table, keep=None if keep is None else keep.value
+        )
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None

@@ -73,8 +73,13 @@ class Box(Parameters):
 
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """Linear in the points."""
-        low, high = np.asarray(self.low), np.asarray(self.high)
-        values: NDArray[np.float64] = np.clip(low + (high - low) * block.points, low, high)
+        low, high = (np.broadcast_to(corner, components) for corner in (self.low, self.high))
+        values = np.empty_like(block.points)
+        for j in range(components):  # a coordinate at a time: NumPy is slow where the last axis is short
+            column = values[:, j]
+            np.multiply(block.points[:, j], high[j] - low[j], out=column)
+            column += low[j]
+            np.clip(column, low[j], high[j], out=column)
         return values
 
     def bounds(self) -> tuple[float, float]:

@@ -81,8 +81,13 @@ def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[
     games = len(values)
     arrays = {"visibility_radius": sc.visibility_radii, "capture_radius": sc.capture_radii}
     arrays |= {"position": sc.positions}
+    whole = {(quantity.field, quantity.row) for quantity in varied if quantity.axis is None}
     for name in {"position"} | {quantity.field for quantity in varied}:
-        arrays[name] = np.repeat(arrays[name][np.newaxis], games, axis=0)
+        common = arrays[name]
+        arrays[name] = np.empty((games, *common.shape))
+        for row in range(len(common)):
+            if (name, row) not in whole:
+                arrays[name][:, row] = common[row]
     column = 0
     for quantity in varied:
         drawn = values[:, column : column + quantity.components]
@@ -90,7 +95,8 @@ def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[
         if quantity.field != "position":
             arrays[quantity.field][:, quantity.row] = drawn[:, 0]
         elif quantity.axis is None:
-            arrays["position"][:, quantity.row, :] = drawn
+            for axis in range(quantity.components):
+                arrays["position"][:, quantity.row, axis] = drawn[:, axis]
         else:
             arrays["position"][:, quantity.row, quantity.axis] = drawn[:, 0]
     return arrays["position"], arrays["visibility_radius"], arrays["capture_radius"]

@@ -12,6 +12,7 @@ from .radius import RadiusCurve
 from .sequences import HalfWidth, mixture_interval
 from .single_radii import Breakpoints, SmallestRadius
 from .stopping import Stopping
+from .tally import Tally
 
 __all__ = [
     "Breakpoints",
@@ -22,6 +23,7 @@ __all__ = [
     "RadiusCurve",
     "SmallestRadius",
     "Stopping",
+    "Tally",
     "TrialOutcomes",
     "compare",
     "difference_interval",

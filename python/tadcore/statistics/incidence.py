@@ -26,17 +26,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore import _core
-from tadcore._shared.arrays import Floats, as_amount, as_index, as_real, refuse_where
+from tadcore._shared.arrays import Floats, Integers, as_amount, as_index
 from tadcore._shared.shares import decimals, percent, share
 from tadcore.errors import ScenarioError
 
 from .outcomes import KINDS, TrialOutcomes, as_level, diverged_of, excluding, indicators, outcome_names
 from .stopping import level_of, stopping_of
+from .tally import Tally, instants
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_OFF_GRID = 1e-6  # steps
 _RAREST = 1e-5  # below this the quantiles of SciPy are too small: at 1e-16 the law exceeds them five times as often
 _MOST_ENTRIES = 2**28  # of a curve for every outcome: 2 GiB each of the estimate and of both ends of its band
 
@@ -160,15 +160,20 @@ def incidence(
     """
     events = indicators(kind, defender, n, diverged)
     names = outcome_names(n, diverged=diverged is not None)
-    confidence = as_level(level)
     times = _grid(as_amount("horizon", horizon), step, n)
     steps = len(times) - 1
-    at = _instants(time, events.shape[1], horizon, steps, between=between)
-    trials = len(at)
+    at = instants(time, events.shape[1], horizon, steps, between=between)
     ended = np.array([np.bincount(at[event], minlength=steps + 1) for event in events])
+    return _curves(names, times, ended, as_level(level), jointly=jointly, looks=as_index("looks", looks, 2**32))
+
+
+def _curves(
+    names: tuple[str, ...], times: Floats, ended: Integers, level: float, *, jointly: bool, looks: int
+) -> Incidence:
+    """The curves from the number of trials that ended in each outcome at each step."""
+    trials = int(ended[excluding(names)].sum())
     estimate = ended.cumsum(axis=1) / trials
-    asked = as_index("looks", looks, 2**32)
-    error = (1.0 - confidence) / (len(names) if jointly else 1) / (asked * (asked + 1) if asked else 1)
+    error = (1.0 - level) / (len(names) if jointly else 1) / (looks * (looks + 1) if looks else 1)
     half = _half_width(error, trials)
     return Incidence(
         times=times,
@@ -177,7 +182,7 @@ def incidence(
         low=np.maximum(estimate - half, 0.0),
         high=np.minimum(estimate + half, 1.0),
         trials=trials,
-        level=confidence,
+        level=level,
         half_width=half,
         jointly=jointly,
     )
@@ -206,19 +211,25 @@ def incidence_of(result: TrialOutcomes, *, level: float | None = None, jointly: 
         There is no trial, or an option breaks a rule.
     """
     sc, stopping = result.scenario, stopping_of(result)
-    found = incidence(
-        result.kind,
-        result.defender,
-        result.time,
-        horizon=sc.horizon,
-        step=sc.step,
-        n=sc.n,
-        level=level_of(stopping, level),
-        jointly=jointly,
-        looks=0 if stopping is None else stopping.looks(result.trials),
-        between=getattr(result, "termination", "sampled") == "continuous",
-        diverged=diverged_of(result),
-    )
+    confidence, looks = level_of(stopping, level), 0 if stopping is None else stopping.looks(result.trials)
+    tally = getattr(result, "tally", None)
+    if isinstance(tally, Tally):
+        ended, times = tally.ended(), _grid(sc.horizon, sc.step, sc.n)
+        found = _curves(tally.names(), times, ended, confidence, jointly=jointly, looks=looks)
+    else:
+        found = incidence(
+            result.kind,
+            result.defender,
+            result.time,
+            horizon=sc.horizon,
+            step=sc.step,
+            n=sc.n,
+            level=confidence,
+            jointly=jointly,
+            looks=looks,
+            between=getattr(result, "termination", "sampled") == "continuous",
+            diverged=diverged_of(result),
+        )
     return found if stopping is None else replace(found, rule=str(stopping))
 
 
@@ -240,23 +251,3 @@ def _grid(horizon: float, step: float, n: int) -> Floats:
     if horizon / step > most:
         raise ScenarioError("step", step, f"large enough for at most {most:,} instants up to {horizon!r}")
     return _core.grid_times(horizon, step)
-
-
-def _instants(
-    time: ArrayLike, trials: int, horizon: float, steps: int, *, between: bool
-) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """The number k of each instant t_k, or of the first one at or after each time."""
-    times = as_real("time", time, "an array of instants")
-    if times.shape != (trials,):
-        raise ScenarioError("time", f"shape {times.shape}", f"of shape ({trials},), one instant for each trial")
-    count = times / horizon * steps
-    rounding = max(_OFF_GRID, 1e-15 * steps)
-    with np.errstate(invalid="ignore"):
-        if between:
-            count = np.ceil(count - rounding)
-        good = np.abs(count - np.rint(count)) <= rounding
-        good &= (count > -0.5) & (count < steps + 0.5)
-    rule = f"a multiple of the step ({horizon / steps!r}) between 0 and the horizon ({horizon!r})"
-    refuse_where("time", times, ~good, rule)
-    whole: np.ndarray[tuple[int], np.dtype[np.int64]] = np.rint(count).astype(np.int64)
-    return whole

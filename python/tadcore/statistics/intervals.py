@@ -27,9 +27,10 @@ from tadcore._shared.shares import estimate, percent
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
 
-from .outcomes import KINDS, MOST_TRIALS, TrialOutcomes, as_counts, as_level, diverged_of, outcome_counts
+from .outcomes import KINDS, MOST_TRIALS, TrialOutcomes, as_counts, as_level, diverged_of, excluding, outcome_counts
 from .sequences import mixture_interval
 from .stopping import level_of, stopping_of
+from .tally import Tally
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,12 +146,17 @@ def probabilities(
     d1               2    0.5000  [0.1500, 0.8500]
     d2               1    0.2500  [0.0456, 0.6994]
     """
-    counts = outcome_counts(kind, defender, n, diverged)
-    trials = np.size(np.asarray(kind))
+    return _estimated(outcome_counts(kind, defender, n, diverged), level, method, rule)
+
+
+def _estimated(counts: dict[str, int], level: float, method: Method, rule: str) -> OutcomeProbabilities:
+    """The probabilities from the counts of every outcome."""
+    names = tuple(counts)
+    trials = sum(counts[names[i]] for i in excluding(names))
     count = np.array(list(counts.values()), dtype=np.int64)
     error = (1.0 - as_level(level)) / (len(KINDS) if method == "sequence" else 1)
     low, high = ends(count, trials, error, method)
-    return OutcomeProbabilities(tuple(counts), count, count / trials, low, high, trials, float(level), method, rule)
+    return OutcomeProbabilities(names, count, count / trials, low, high, trials, float(level), method, rule)
 
 
 def probabilities_of(
@@ -184,15 +190,13 @@ def probabilities_of(
     by_default: Method = "wilson" if stopping is None else "sequence"
     design = getattr(getattr(result, "study", None), "design", "random")
     even = "" if design == "random" else f"{design} design: intervals are those of independent draws"
-    return probabilities(
-        result.kind,
-        result.defender,
-        result.scenario.n,
-        diverged=diverged_of(result),
-        level=level_of(stopping, level),
-        method=by_default if method is None else method,
-        rule=even if stopping is None else str(stopping),
-    )
+    tally = getattr(result, "tally", None)
+    if isinstance(tally, Tally):
+        counts = tally.outcomes()
+    else:
+        counts = outcome_counts(result.kind, result.defender, result.scenario.n, diverged_of(result))
+    decided = even if stopping is None else str(stopping)
+    return _estimated(counts, level_of(stopping, level), by_default if method is None else method, decided)
 
 
 def proportion_interval(

@@ -1,26 +1,27 @@
-"""Every chunk of a study from its store or computed, examined in order, up to where a rule stops it."""
+"""Every chunk of a study, stored or played, counted in order, up to where a rule stops it."""
 
 from __future__ import annotations
 
 import contextlib
-import math
+from collections.abc import Iterable
 from concurrent.futures import Executor
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore.errors import WorkerError
 from tadcore.game.outcome import OutcomeKind
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.stopping import Stopping, kept, stopping_by
+from tadcore.statistics.tally import Tally
 
+from .keepers import Keeper
 from .plan import Plan
 from .progress import Progress
-from .store import Store
-from .table import schema_of, table_of
-from .workers import LostWorkerError, computed
+from .rows import Rows
+from .workers import LostWorkerError, Wanted, played_by
 
 
 @runtime_checkable
@@ -36,89 +37,98 @@ class StoppingRule(Protocol):
 
 
 class Collection:
-    """Every chunk of a study, from the store or computed, in their order, up to where a rule holds.
+    """The chunks of a study, up to where a rule holds.
 
     Parameters
     ----------
     plan : Plan
         What the chunks are computed from.
     trials : int
-        How many there are to be.
-    store : Store or None
-        Where finished chunks are read and kept.
+        Trials of the whole study.
+    chunks : range
+        The chunks to collect: all, or those of one part of the study.
+    keeper : Keeper
+        What takes them, and knows which it has already.
     bar : Progress
         What is told of every chunk.
     until : StoppingRule or None
         Asked after every chunk before which none is missing.
     """
 
-    def __init__(self, plan: Plan, trials: int, store: Store | None, bar: Progress, until: StoppingRule | None) -> None:
-        self._plan, self._store, self._bar, self._until = plan, store, bar, until
-        self._schema = schema_of(plan)
-        self._jobs = jobs_of(trials)
-        self._tables: dict[int, pa.Table] = {}
+    def __init__(
+        self, plan: Plan, trials: int, chunks: range, keeper: Keeper, bar: Progress, until: StoppingRule | None
+    ) -> None:
+        self._plan, self._trials, self._chunks = plan, trials, chunks
+        self._keeper, self._bar, self._until = keeper, bar, until
+        nothing = Tally.empty(plan.scenario.n, plan.scenario.steps)
+        self._total, self._added = nothing, [nothing]
+        self._waiting: dict[int, tuple[int, Tally]] = {}
+        self._next = chunks.start
         self._stopped: int | None = None
-        self._looked = 0
-        self._counts = np.zeros(len(OutcomeKind) + 1, dtype=np.int64)
+        self._done = 0
 
     @property
     def stopping(self) -> Stopping | None:
         """The rule that is asked, and whether it has held."""
         return None if self._until is None else stopping_by(self._until, held=self._stopped is not None, chunk=CHUNK)
 
-    def gather(self, executor: Executor | None, threads: int | None) -> pa.Table:
-        """The chunks in one table; what is not in the store is computed."""
-        left = []
-        for chunk, rows in self._jobs:
-            if self._store is not None and self._store.rows.get(chunk, 0) >= rows:
-                self._add(chunk, self._store.read(chunk).slice(0, rows), stored=True)
-            else:
-                left.append((chunk, rows))
-        self._tell_store()
-        if self._stopped is None and left:
+    def gather(self, executor: Executor | None, threads: int | None, table: Path | None) -> Rows:
+        """Take what is stored, play what is not, and return all of it."""
+        stopping = self.stopping
+        left = self._keeper.begin(self._chunks, None if stopping is None else kept(stopping))
+        for chunk, chunks, tally in self._keeper.stored(apart=self._until is not None):
+            self._add(chunk, chunks, [tally], stored=True)
+        self._tell()
+        with contextlib.closing(self._keeper):
             try:
-                self._compute(left, executor, threads)
+                if self._stopped is None and left:
+                    self._play(left, executor, threads, table)
             except LostWorkerError as error:
-                place = None if self._store is None else str(self._store.folder)
-                raise WorkerError(str(error), len(self._tables), len(self._jobs), place) from error.__cause__
-        self._tell_store()
-        last = self._looked if self._stopped is not None else len(self._tables)
-        return pa.concat_tables([self._tables[chunk] for chunk in range(last)]).combine_chunks()
+                place = self._keeper.place
+                raise WorkerError(str(error), self._done, len(self._chunks), place) from error.__cause__
+        self._tell()
+        trials = min(self._trials, self._chunks.stop * CHUNK) if self._stopped is None else self._stopped
+        return self._keeper.rows(trials, self._total if self._until is not None else self._sum())
 
-    def _compute(self, left: list[tuple[int, int]], executor: Executor | None, threads: int | None) -> None:
-        with contextlib.closing(computed(self._plan, left, executor, threads)) as results:
-            for chunk, outcomes in results:
-                table = table_of(chunk, outcomes, self._plan, self._schema)
-                if self._store is not None:
-                    self._store.write(chunk, table)
-                self._add(chunk, table)
+    def _play(self, left: list[int], executor: Executor | None, threads: int | None, table: Path | None) -> None:
+        wanted = Wanted(left, self._trials, self._keeper.keep, self._until is not None)
+        with contextlib.closing(played_by(self._plan, wanted, executor, threads, table)) as results:
+            for played in results:
+                self._add(played.task.first, len(played.task.chunks()), played.tallies)
+                if self._stopped is None or self._keeper.keep != "counts":
+                    self._keeper.add(played)
                 if self._stopped is not None:
                     return
 
-    def _add(self, chunk: int, table: pa.Table, *, stored: bool = False) -> None:
-        """Keep a chunk, and ask the rule after every chunk before which none is missing."""
-        self._tables[chunk] = table
-        if self._until is not None:
-            while self._stopped is None and self._looked in self._tables:
-                self._counts += _counts(self._tables[self._looked])
-                self._looked += 1
-                trials = int(self._counts.sum())
-                if self._until.satisfied(self._counts[: len(OutcomeKind)].copy(), trials):
-                    self._stopped = trials
-        self._bar.add(_counts(table), stored=stored)
+    def _add(self, first: int, chunks: int, tallies: Iterable[Tally], *, stored: bool = False) -> None:
+        """Count chunks, and ask the rule after every chunk before which none is missing."""
+        listed = list(tallies)
+        self._done += chunks
+        if self._until is None:
+            self._added += listed
+            if len(self._added) > 64:
+                self._sum()
+        else:
+            each = chunks // len(listed)
+            self._waiting |= {first + i * each: (each, tally) for i, tally in enumerate(listed)}
+            self._ask(self._until)
+        for tally in listed:
+            self._bar.add(tally.kinds(), stored=stored)
 
-    def _tell_store(self) -> None:
-        if self._store is not None:
-            stopping = self.stopping
-            self._store.stop(self._stopped, None if stopping is None else kept(stopping))
+    def _ask(self, until: StoppingRule) -> None:
+        while self._stopped is None and self._next in self._waiting:
+            chunks, tally = self._waiting.pop(self._next)
+            self._total += tally
+            self._next += chunks
+            trials = self._total.trials
+            if until.satisfied(self._total.kinds()[: len(OutcomeKind)].copy(), trials):
+                self._stopped = trials
 
+    def _sum(self) -> Tally:
+        total = Tally.sum(self._added, self._plan.scenario.n, self._plan.scenario.steps)
+        self._added = [total]
+        return total
 
-def _counts(table: pa.Table) -> NDArray[np.int64]:
-    """Trials by the kind of their end, then those that diverged, however they end."""
-    codes = np.where(table["diverged"].to_numpy(), len(OutcomeKind), table["kind"].to_numpy())
-    return np.bincount(codes, minlength=len(OutcomeKind) + 1).astype(np.int64)
-
-
-def jobs_of(trials: int) -> list[tuple[int, int]]:
-    """Every chunk with the number of its trials."""
-    return [(chunk, min(CHUNK, trials - chunk * CHUNK)) for chunk in range(math.ceil(trials / CHUNK))]
+    def _tell(self) -> None:
+        stopping = self.stopping
+        self._keeper.stop(self._stopped, None if stopping is None else kept(stopping))

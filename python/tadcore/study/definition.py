@@ -10,19 +10,20 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats, as_flag, as_index
 from tadcore._shared.calls import public
+from tadcore._shared.threads import in_order
 from tadcore.errors import ScenarioError
 from tadcore.sampling.adapters import as_sampler
 from tadcore.sampling.base import Sampler
-from tadcore.sampling.design import DESIGNS, Design
+from tadcore.sampling.design import CHUNK, DESIGNS, Design
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.termination import Termination, as_termination
 
-from .collect import jobs_of
+from .keeping import Keep, as_keep
 from .manifest import Manifest
-from .plan import Plan
+from .plan import Plan, rows_of_chunks
 
 _MOST_TRIALS = 2**32  # points of the Sobol' sequence
 
@@ -41,6 +42,7 @@ class Definition:
         design: Design = "random",
         termination: Termination = "sampled",
         passes: bool = False,
+        keep: Keep = "all",
     ) -> None:
         sc = as_scenario(sc)
         if not isinstance(vary, Mapping) or not vary:
@@ -55,9 +57,10 @@ class Definition:
             if name in samplers:
                 raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
             samplers[name] = as_sampler(f'vary["{path}"]', value)
+        self._keep = as_keep(keep)
         key = as_index("seed", seed, 2**64 - 1)
-        self._plan = Plan(sc, samplers, key, design, as_termination(termination), as_flag("passes", passes))
-        for quantity, sampler in self._plan.varied:
+        self.plan = Plan(sc, samplers, key, design, as_termination(termination), as_flag("passes", passes))
+        for quantity, sampler in self.plan.varied:
             if design != "random" and not sampler.by_points:
                 rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
                 raise ScenarioError(f'vary["{quantity.path}"]', sampler, rule)
@@ -65,42 +68,47 @@ class Definition:
     @property
     def scenario(self) -> Scenario:
         """The scenario around which the inputs vary."""
-        return self._plan.scenario
+        return self.plan.scenario
 
     @property
     def vary(self) -> Mapping[str, Sampler]:
         """The sampler of every path."""
-        return MappingProxyType(self._plan.vary)
+        return MappingProxyType(self.plan.vary)
 
     @property
     def seed(self) -> int:
         """The seed."""
-        return self._plan.seed
+        return self.plan.seed
 
     @property
     def design(self) -> Design:
         """The design of the draws."""
-        return self._plan.design
+        return self.plan.design
 
     @property
     def termination(self) -> Termination:
         """When a game ends."""
-        return self._plan.termination
+        return self.plan.termination
 
     @property
     def passes(self) -> bool:
         """Whether passes within a capture radius are looked for."""
-        return self._plan.passes
+        return self.plan.passes
+
+    @property
+    def keep(self) -> Keep:
+        """What `Study.run` keeps of every trial, unless it is told."""
+        return self._keep
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """What varies, wildcards expanded."""
-        return self._plan.quantities
+        return self.plan.quantities
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs, one for each varied component."""
-        return self._plan.columns
+        return self.plan.columns
 
     def inputs(self, trials: int | None = None) -> dict[str, Floats]:
         """Draw without playing: the inputs of the first trials, all of them by default, by the name of the column.
@@ -111,8 +119,15 @@ class Definition:
             How many.
         """
         wanted = self.trials if trials is None else as_index("trials", trials, self.trials, least=1)
-        drawn = [self._plan.draw(chunk, rows) for chunk, rows in jobs_of(wanted)]
+        drawn = list(in_order(self._drawn, enumerate(rows_of_chunks(wanted)), None))
         return dict(zip(self.columns, np.ascontiguousarray(np.concatenate(drawn).T), strict=True))
+
+    def draw(self, trial: int) -> Floats:
+        """The inputs of one trial, shape (1, columns)."""
+        return self.plan.draw(trial // CHUNK)[trial % CHUNK :][:1]
+
+    def _drawn(self, job: tuple[int, int]) -> Floats:
+        return self.plan.draw(*job)
 
     def check(self, *, progress: bool = False) -> None:
         """Draw every trial without playing, as `run` does before anything else; a million take 0.1 s.
@@ -127,9 +142,9 @@ class Definition:
         ScenarioError
             A draw is no game: the path, the trial and the value are named.
         """
-        self._plan.check_ahead(self.trials, progress=progress)
+        self.plan.check_ahead(self.trials, progress=progress)
 
-    def manifest(self) -> Manifest:
+    def manifest(self, keep: Keep) -> Manifest:
         """What a store of the study says about itself."""
         return Manifest(
             scenario=self.scenario.to_toml(),
@@ -140,6 +155,7 @@ class Definition:
             columns=self.columns,
             termination=self.termination,
             passes=self.passes,
+            keep=keep,
         )
 
     def __repr__(self) -> str:

@@ -6,10 +6,12 @@ another study.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
 import platform
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -22,13 +24,15 @@ from tadcore.sampling.adapters import as_plain, from_plain
 from tadcore.sampling.design import CHUNK, STREAM
 from tadcore.simulation.termination import Termination, as_termination
 
+from .keeping import Keep, as_keep
+
 Kind = TypeVar("Kind")
 
 MANIFEST = "_manifest.json"
 """Its name: readers of a folder of Parquet files pass over what begins with an underscore."""
 
-FORMAT = 3
-"""Version of the layout of a store; 1 had no digest of the manifest, 2 no ``outcome`` and ``manifest.json``."""
+FORMAT = 4
+"""Version of the layout of a store; 3 had a part for every chunk, 2 no ``outcome``, 1 no digest of the manifest."""
 
 _OLD = "manifest.json"  # its name up to format 2
 
@@ -60,6 +64,8 @@ class Manifest:
         When a game ends; written where it is not the sampled definition.
     passes : bool
         Whether passes within a capture radius are looked for; written where they are.
+    keep : {"all", "outcomes", "counts"}
+        What the store keeps of every trial.
     version, created : str
         The version of this library, and when the store was made (UTC).
     environment : dict of str to str
@@ -76,6 +82,7 @@ class Manifest:
     rule: dict[str, Any] | None = None
     termination: Termination = "sampled"
     passes: bool = False
+    keep: Keep = "all"
     chunk: int = CHUNK
     stream: int = STREAM
     version: str = _core.__version__
@@ -105,6 +112,7 @@ class Manifest:
             "chunk": self.chunk,
             "trials": self.trials,
             "stopped": self.stopped,
+            "keep": self.keep,
             "columns": list(self.columns),
             "vary": as_plain(self.vary),
             "scenario": self.scenario,
@@ -114,6 +122,16 @@ class Manifest:
         if self.rule is not None:
             content["rule"] = self.rule
         return json.dumps(content | {SEAL: seal(content)}, indent=2, ensure_ascii=False) + "\n"
+
+    def same(self, wanted: Manifest, place: Path) -> None:
+        """Raise `StoreError` where this is not the manifest of the study that is wanted, or of what it keeps."""
+        if self.study != wanted.study:
+            decides = ("scenario", "vary", "seed", "design", "chunk", "stream", "termination", "passes")
+            differ = ", ".join(name for name in decides if getattr(self, name) != getattr(wanted, name))
+            raise StoreError(str(place), f"it holds another study (its {differ} differ)", "name another folder")
+        if self.keep != wanted.keep:
+            found = f"it keeps {self.keep!r} of every trial, and this run {wanted.keep!r}"
+            raise StoreError(str(place), found, f"name another folder, or run with keep={self.keep!r}")
 
     @classmethod
     def read(cls, folder: str | os.PathLike[str]) -> Manifest:
@@ -153,6 +171,7 @@ class Manifest:
                 trials=_whole(content, "trials"),
                 columns=tuple(_entry({"columns": name}, "columns", str) for name in columns),
                 termination=as_termination(content.get("termination", "sampled")),
+                keep=as_keep(content["keep"]),
                 passes=_entry({"passes": False} | content, "passes", bool),
                 stopped=None if content["stopped"] is None else _whole(content, "stopped"),
                 rule=_entry(content, "rule", dict) if "rule" in content else None,
@@ -189,6 +208,17 @@ def environment() -> dict[str, str]:
     """What else the last bit of a draw may depend on."""
     packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
     return {"machine": platform.platform(), "python": platform.python_version(), **packages}
+
+
+@contextlib.contextmanager
+def faults(path: Path) -> Iterator[None]:
+    """What the operating system refuses, in the words of a store."""
+    try:
+        yield
+    except OSError as error:
+        found = f"it cannot be written or read ({reason(error)})"
+        remedy = "nothing that was finished is lost: make room or name a folder that can be written, and run again"
+        raise StoreError(str(path), found, remedy) from error
 
 
 def reason(error: OSError) -> str:

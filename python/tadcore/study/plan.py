@@ -2,40 +2,82 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from dataclasses import dataclass
+import threading
+import time
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tadcore._core import Game, Stop
 from tadcore._shared.arrays import Floats
 from tadcore._shared.limits import OF_FIELD, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore._shared.progress import bar
+from tadcore._shared.threads import in_order
 from tadcore.errors import ScenarioError
+from tadcore.game.compiled import game_of
 from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.quantities import Quantity, setups
-from tadcore.simulation.batch import simulate_batch
 from tadcore.simulation.rules import extents_of
 from tadcore.simulation.termination import Termination
+from tadcore.statistics.tally import Tally, steps_of
 
+from .keeping import Keep
 from .vary import quantities
 
 
 class Outcomes(NamedTuple):
-    """What a chunk returns: plain arrays of one length, ready for another process."""
+    """How the trials of a chunk ended: plain arrays of one length, ready for another process."""
 
     kind: NDArray[np.int8]
     defender: NDArray[np.int32]
     time: Floats
     diverged: NDArray[np.bool_]
-    inputs: Floats
-    """What was drawn, one column for each varied component."""
+    inputs: Floats | None
+    """What was drawn, one column for each varied component; None where it is drawn again when asked for."""
     passed: NDArray[np.bool_] | None = None
     """Whether a capture radius was entered between two instants, where that is looked for."""
+
+
+class Task(NamedTuple):
+    """What is asked of one worker at a time: a group of consecutive chunks."""
+
+    first: int
+    """The first chunk."""
+    trials: int
+    """Trials from the beginning of the first chunk on; only the last chunk may be cut."""
+    keep: Keep
+    """What comes back: outcomes with their inputs, outcomes, or their counts alone."""
+    apart: bool
+    """Whether the chunks are counted one by one, for a rule that is asked after each."""
+
+    def chunks(self) -> list[tuple[int, int]]:
+        """Every chunk with the number of its trials."""
+        return [(self.first + i, rows) for i, rows in enumerate(rows_of_chunks(self.trials))]
+
+
+class Played(NamedTuple):
+    """What a worker returns."""
+
+    task: Task
+    tallies: tuple[Tally, ...]
+    """The counts of the group, or of each of its chunks."""
+    outcomes: tuple[Outcomes, ...]
+    """Those of every chunk; empty where only counts are kept."""
+    seconds: float
+    """How long it took."""
+
+
+def rows_of_chunks(trials: int) -> list[int]:
+    """How many trials each chunk has."""
+    whole, rest = divmod(trials, CHUNK)
+    return [CHUNK] * whole + [rest] * (rest > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +90,7 @@ class Plan:
     design: Design
     termination: Termination = "sampled"
     passes: bool = False
+    _one_at_a_time: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     @cached_property
     def varied(self) -> tuple[tuple[Quantity, Sampler], ...]:
@@ -71,17 +114,21 @@ class Plan:
         """
         layout = [(q.purpose, sampler.coordinates(q.components)) for q, sampler in self.varied]
         points = unit_points(self.design, self.seed, chunk, layout)
-        drawn = [
-            sampler.draw(Block(p, generator(self.seed, chunk, q.purpose), chunk * CHUNK), q.components)
-            for (q, sampler), p in zip(self.varied, points, strict=True)
-        ]
-        return np.concatenate(drawn, axis=1)[:rows] if drawn else np.empty((rows, 0))
+        drawn = []
+        for (q, sampler), p in zip(self.varied, points, strict=True):
+            # What has a state of its own, such as a user's function, must not be called by two threads at once.
+            with contextlib.nullcontext() if sampler.by_points else self._one_at_a_time:
+                block = Block(p, generator(self.seed, chunk, q.purpose), chunk * CHUNK)
+                drawn.append(sampler.draw(block, q.components))
+        columns = np.empty((len(self.columns), CHUNK))  # each by itself in memory, as everything after this wants it
+        np.concatenate([values.T for values in drawn], out=columns)
+        return columns.T[:rows]
 
     def check(self, chunk: int, inputs: Floats) -> None:
         """Raise `ScenarioError` for the first trial of a chunk whose draws are no game: its path, number and value."""
         fields = [(name, quantity.field) for quantity in self.quantities for name in quantity.columns]
-        for values, (name, field) in zip(inputs.T, fields, strict=True):
-            for rule in OF_FIELD[field]:
+        for values, (name, kind) in zip(inputs.T, fields, strict=True):
+            for rule in OF_FIELD[kind]:
                 self._refuse(chunk, name, values, ~rule.holds(values), rule.words)
         positions, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
@@ -95,16 +142,21 @@ class Plan:
             path = f"defenders.{i}.visibility_radius" if i < self.scenario.n else f"{where}.visibility_radius"
             self._refuse(chunk, path, np.broadcast_to(seen, bad.shape), bad, too_far(float(extents[int(bad.argmax())])))
 
-    def check_ahead(self, trials: int, *, progress: bool = False) -> None:
-        """Check before anything runs that every trial is a game: a millisecond a chunk, one chunk in memory at a time.
+    def check_ahead(self, trials: int, *, threads: int | None = None, progress: bool = False) -> None:
+        """Check before anything runs that every trial is a game: a millisecond a chunk, few of them in memory.
 
         Where the supports of the samplers prove it, the first chunk is enough.
         """
-        chunks = range(1 if self._proven() else math.ceil(trials / CHUNK))
-        for chunk in bar(chunks, "checking draws", show=progress):
+
+        def checked(chunk: int) -> None:
             self.check(chunk, self.draw(chunk, min(CHUNK, trials - chunk * CHUNK)))
 
-    def _proven(self) -> bool:
+        chunks = range(1 if self.proven else math.ceil(trials / CHUNK))
+        for _ in bar(in_order(checked, chunks, threads), "checking draws", total=len(chunks), show=progress):
+            pass
+
+    @cached_property
+    def proven(self) -> bool:
         """Whether the supports of the samplers alone leave no bad draw possible."""
         sc = self.scenario
         reach = {("visibility_radius", i): (float(r), float(r)) for i, r in enumerate(sc.visibility_radii)}
@@ -127,28 +179,36 @@ class Plan:
             row = int(bad.argmax())
             raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), rule)
 
-    def run(self, chunk: int, rows: int, threads: int | None) -> Outcomes:
-        """Draw, check and play the first ``rows`` trials of a chunk."""
-        inputs = self.draw(chunk, rows)
-        self.check(chunk, inputs)
-        positions, sight, capture = setups(self.scenario, self.quantities, inputs)
-        between: dict[str, Any] = {"termination": self.termination, "passes": self.passes}
-        batch = simulate_batch(self.scenario, positions, sight, capture, threads=threads, **between)
-        return Outcomes(batch.kind, batch.defender, batch.time, batch.diverged, inputs, batch.passed)
+    @cached_property
+    def game(self) -> Game:
+        """The compiled game, shared by all that have its weights."""
+        return game_of(self.scenario)
 
+    def play(self, inputs: Floats, threads: int | None, stop: Stop | None = None) -> Outcomes:
+        """Play the trials that have these inputs; the core refuses what is no game, and ends when ``stop`` is set."""
+        setup = setups(self.scenario, self.quantities, inputs)
+        starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
+        between: dict[str, bool] = {"continuous": self.termination == "continuous", "passes": self.passes}
+        kind, defender, time, diverged, passed = self.game.simulate_batch(
+            starts, sight, capture, **between, threads=threads, stop=stop
+        )
+        return Outcomes(kind, defender, time, diverged, inputs, passed if self.passes else None)
 
-def run_chunk(
-    scenario: str,
-    vary: dict[str, Sampler],
-    seed: int,
-    design: Design,
-    termination: Termination,
-    passes: bool,
-    chunk: int,
-    rows: int,
-    threads: int | None,
-) -> Outcomes:
-    """`Plan.run` in another process, from the scenario's TOML; the process keeps its table from chunk to chunk."""
-    from tadcore.scenario.model import Scenario
+    def tally(self, outcomes: Outcomes) -> Tally:
+        """How many of the trials ended in each way at each step."""
+        sc = self.scenario
+        step, _ = steps_of(outcomes.time, sc.horizon, sc.steps, between=self.termination == "continuous")
+        return Tally.of(outcomes.kind, outcomes.defender, outcomes.diverged, step, sc.n, sc.steps)
 
-    return Plan(Scenario.from_toml_string(scenario), vary, seed, design, termination, passes).run(chunk, rows, threads)
+    def run(self, task: Task, threads: int | None, stop: Stop | None = None) -> Played:
+        """Draw and play a group of chunks, one after another."""
+        began = time.perf_counter()
+        kept, tallies = [], []
+        for chunk, rows in task.chunks():
+            outcomes = self.play(self.draw(chunk, rows), threads, stop)
+            tallies.append(self.tally(outcomes))
+            if task.keep != "counts":
+                kept.append(outcomes if task.keep == "all" else outcomes._replace(inputs=None))
+        if not task.apart:
+            tallies = [Tally.sum(tallies, self.scenario.n, self.scenario.steps)]
+        return Played(task, tuple(tallies), tuple(kept), time.perf_counter() - began)

@@ -21,33 +21,30 @@ Every worker process builds its own table of gains. The store is written by the 
 
 from __future__ import annotations
 
-import contextlib
 import os
 from concurrent.futures import Executor
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
 from tadcore._shared.files import as_path
-from tadcore.errors import ScenarioError, StoreError
-from tadcore.game.compiled import game_of
-from tadcore.sampling.adapters import from_table
+from tadcore.errors import OutOfMemoryError
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.paths import ByPath
 from tadcore.scenario.quantities import setups
 from tadcore.simulation.run import Run, simulate
-from tadcore.statistics.stopping import Stopping, from_kept
+from tadcore.statistics.stopping import Stopping
 
-from .collect import Collection, StoppingRule
+from .collect import StoppingRule
 from .definition import Definition
-from .manifest import MANIFEST, Manifest
-from .progress import Progress
-from .store import Store
+from .keeping import Keep
+from .reading import opened, rows_and_rule
+from .rows import MOST_BYTES, Rows
+from .running import Options, gathered
 from .trials import Trials
-from .warm_start import warm
 
 
 class Study(Definition):
@@ -75,6 +72,8 @@ class Study(Definition):
     passes : bool
         Whether to look for games that enter a capture radius between two instants: a column ``passed``, as in
         `tadcore.Batch`. A store with it is not taken for one without.
+    keep : {"all", "outcomes", "counts"}
+        What `run` keeps of every trial, unless it is told.
 
     Raises
     ------
@@ -105,6 +104,7 @@ class Study(Definition):
         """Another study with some of the arguments changed."""
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
         given |= {"design": self.design, "termination": self.termination, "passes": self.passes}
+        given["keep"] = self.keep
         return Study(**{"sc": self.scenario, **given, **changes})
 
     @classmethod
@@ -134,6 +134,7 @@ class Study(Definition):
         executor: Executor | None = None,
         until: StoppingRule | None = None,
         table: str | os.PathLike[str] | None = None,
+        keep: Keep | None = None,
     ) -> StudyResult:
         """Play the trials.
 
@@ -142,20 +143,24 @@ class Study(Definition):
         progress : bool or str
             Show a bar with the rate and running estimates, in a terminal or a notebook; a string stands before it.
         store : path, optional
-            A folder that keeps every finished chunk. If it holds this study already, the run resumes from there; a
+            A folder that keeps what is finished. If it holds this study already, the run resumes from there; a
             larger ``trials`` extends it.
         threads : int, optional
-            Threads for each chunk; all cores by default, or 1 in the workers of an executor.
+            Threads that play; all cores by default, or 1 in each worker of an executor.
         executor : concurrent.futures.Executor, optional
             Who computes the chunks: a process pool, Dask's ``client.get_executor()``, ``MPIPoolExecutor``. By default
-            this process does, one chunk after another.
+            threads of this process do.
         until : StoppingRule, optional
             Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds. Statistics of
             the result then use confidence sequences, which hold whatever the rule looked at.
         table : path, optional
             A file that keeps the game's table of transitions from study to study: read before, written after. With it
-            a study of the same game reuses the saved gain table; the outcomes are the same. Not used by the workers
-            of an executor. A file that is no such table is refused.
+            a study of the same game reuses the saved gain table; the outcomes are the same. Workers of an
+            executor read it, where they reach it, and do not write it. A file that is no such table is refused.
+        keep : {"all", "outcomes", "counts"}, optional
+            What is kept of every trial: its outcome and what was drawn; its outcome, what was drawn being drawn again
+            when it is asked for; or nothing, only how many ended in each way at each step, from which probabilities,
+            incidence and stopping rules follow as exactly. By default the study's own `keep`.
 
         Returns
         -------
@@ -176,24 +181,8 @@ class Study(Definition):
         KeyboardInterrupt
             Ctrl-C; what was finished is in the store.
         """
-        workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
-        if executor is not None and not isinstance(executor, Executor):
-            hint = ": client.get_executor()" if hasattr(executor, "get_executor") else ""
-            raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")
-        if until is not None and not isinstance(until, StoppingRule):
-            raise ScenarioError("until", until, "a stopping rule such as tadcore.statistics.HalfWidth(0.002)")
-        if until is not None and self.design != "random":
-            rule = "left out: its interval needs independent draws, which only design='random' gives"
-            raise ScenarioError("until", f"a rule for design={self.design!r}", rule)
-        folder = None if store is None else as_path("store", store)
-        kept_table = None if table is None else as_path("table", table)
-        self.check(progress=bool(progress))
-        game_of(self.scenario).equilibrium()
-        opened = contextlib.nullcontext() if folder is None else Store.writing(folder, self.manifest(), self._plan)
-        with warm(self.scenario, kept_table), opened as kept, Progress(self.trials, wanted=progress) as bar:
-            chunks = Collection(self._plan, self.trials, kept, bar, until)
-            played = chunks.gather(executor, workers)
-            return StudyResult(self, played, chunks.stopping)
+        options = Options(progress, store, threads, executor, until, table, keep)
+        return StudyResult(self, *gathered(self, options))
 
 
 class StudyResult(Trials):
@@ -207,8 +196,10 @@ class StudyResult(Trials):
         One row for each trial: ``trial``, ``outcome`` (categorical: ``"timeout"``, ``"captured"``, ``"d1"``, …, or
         ``"diverged"``), ``kind`` (codes of `OutcomeKind`), ``defender`` (0-based, -1 where none intercepted), ``time``,
         ``diverged`` (whether the game diverged, see `tadcore.game.Divergence`), ``passed`` where the study looks for
-        passes, and a column for each varied component, such as ``attacker.position.x``. The metadata of the schema
-        explains each.
+        passes, and, where the study keeps all, a column for each varied component, such as ``attacker.position.x``. The
+        metadata of the schema explains each.
+    tally : Tally
+        How many trials ended in each way at each step, whatever is kept.
     scenario : Scenario
         The scenario around which the inputs vary.
     seed : int
@@ -217,11 +208,36 @@ class StudyResult(Trials):
         The rule that was asked when to stop, whether it held or not; None where the number of trials was fixed.
     """
 
-    def __init__(self, study: Study, table: pa.Table, stopping: Stopping | None = None) -> None:
-        super().__init__(study.scenario, study.seed, table, stopping, study.termination)
+    def __init__(self, study: Study, rows: Rows, stopping: Stopping | None = None) -> None:
+        super().__init__(study.scenario, study.seed, rows, stopping, study.termination)
         object.__setattr__(self, "study", study)
 
     study: Study
+
+    @cached_property
+    def inputs(self) -> dict[str, Floats]:
+        """What was drawn: an array of shape (trials,) for each varied component, by the name of its column.
+
+        Any spelling of a path finds it: ``inputs["d1.visibility_radius"]``. What the study did not keep is drawn again,
+        bitwise as it was.
+
+        Raises
+        ------
+        ScenarioError
+            It was not kept, and a sampler is known by its name only.
+        OutOfMemoryError
+            It takes more than 4 GiB.
+        """
+        if self._has_inputs:
+            return super().inputs
+        size = 8 * self.trials * len(self.study.columns)
+        if size > MOST_BYTES:
+            raise OutOfMemoryError(f"the inputs of {self.trials:,} trials", size, MOST_BYTES)
+        return ByPath(self.study.inputs(self.trials))
+
+    @property
+    def _has_inputs(self) -> bool:
+        return set(self.study.columns) <= set(self.rows.names)
 
     def setup(self, trial: int) -> Scenario:
         """The scenario that one trial played: its positions and radii in place of the common ones.
@@ -237,7 +253,11 @@ class StudyResult(Trials):
             There is no such trial.
         """
         row = as_index("trial", trial, self.trials - 1)
-        drawn = np.array([[self.table[name][row].as_py() for name in self.study.columns]])
+        if self._has_inputs:
+            kept = self.rows.at(row)
+            drawn = np.array([[kept[name][0].as_py() for name in self.study.columns]])
+        else:
+            drawn = self.study.draw(row)
         arrays = dict(
             zip(
                 ("position", "visibility_radius", "capture_radius"),
@@ -281,9 +301,11 @@ class StudyResult(Trials):
 def load_study(folder: str | os.PathLike[str]) -> StudyResult:
     """Read a study back from its store alone.
 
-    Every part is verified. Of a study that was cut off, the trials before the first missing chunk are returned: chunks
-    that happened to be finished beyond it are left for `Study.run` to build on. The study of the result can be run
-    again to go on, unless it varies by a callable or another object that a store knows by its name only.
+    Up to four million trials are read, and verified; of a longer study a part is read, and verified, when its rows are
+    asked for, and its counts come from the ends of its files. Of a study that was cut off, the trials before the first
+    missing chunk are returned: chunks that happened to be finished beyond it are left for `Study.run` to build on. The
+    study of the result can be run again to go on, unless it varies by a callable or another object that a store knows
+    by its name only.
 
     Parameters
     ----------
@@ -302,32 +324,5 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
     StoreError
         The folder is no store, or one of its files is truncated, foreign or damaged.
     """
-    from tadcore.scenario.model import Scenario
-
-    manifest = Manifest.read(as_path("folder", folder))
-    vary = {path: from_table(f'vary["{path}"]', table, stored=True) for path, table in manifest.vary.items()}
-    study = Study(
-        Scenario.from_toml_string(manifest.scenario, name=os.fspath(folder)),
-        vary,
-        trials=manifest.trials,
-        seed=manifest.seed,
-        design=manifest.design,  # type: ignore[arg-type]  # the constructor checks it
-        termination=manifest.termination,
-        passes=manifest.passes,
-    )
-    store = Store.reading(folder, manifest, study._plan)
-    wanted = manifest.trials if manifest.stopped is None else manifest.stopped
-    tables = [store.schema.empty_table()]
-    chunk = 0
-    while wanted > 0 and chunk in store.rows:
-        tables.append(store.read(chunk).slice(0, wanted))
-        wanted -= len(tables[-1])
-        if len(tables[-1]) < manifest.chunk:
-            break
-        chunk += 1
-    try:
-        stopping = from_kept(manifest.rule, held=manifest.stopped is not None, chunk=manifest.chunk)
-    except ValueError as error:
-        place = str(Path(folder, MANIFEST))
-        raise StoreError(place, f"it is no manifest of a study ({error})", "put back a copy of this file") from None
-    return StudyResult(study, pa.concat_tables(tables).combine_chunks(), stopping)
+    store, arguments = opened(folder)
+    return StudyResult(Study(**arguments), *rows_and_rule(store))

@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -27,7 +26,9 @@ from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.sampling.design import CHUNK
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.termination import Termination
+from tadcore.statistics.tally import Tally, steps_of
 
+from .keeping import Keep
 from .plan import Outcomes, Plan
 
 _UNIT = "1"  # everything is dimensionless, as in the paper
@@ -102,9 +103,10 @@ def _own(plan: Plan) -> dict[str, Column]:
     return FIXED | PASSED if plan.passes else FIXED
 
 
-def schema_of(plan: Plan) -> pa.Schema:
+def schema_of(plan: Plan, keep: Keep) -> pa.Schema:
     """The schema of a study's table; no entry is ever missing."""
     inputs = {name: (pa.float64(), _INPUTS[q.field], _UNIT) for q in plan.quantities for name in q.columns}
+    inputs = inputs if keep == "all" else {}
     columns = {name: (column.type, column.meaning, column.unit) for name, column in _own(plan).items()} | inputs
     about = {
         name: {"meaning": meaning} | ({"unit": unit} if unit else {}) for name, (_, meaning, unit) in columns.items()
@@ -120,28 +122,38 @@ def schema_of(plan: Plan) -> pa.Schema:
     return pa.schema(fields, {f"tadcore_{key}": value for key, value in said.items()})
 
 
-def table_of(chunk: int, outcomes: Outcomes, plan: Plan, schema: pa.Schema) -> pa.Table:
-    """One chunk as a table."""
-    fixed = [column.values(chunk * CHUNK, outcomes, plan.scenario) for column in _own(plan).values()]
-    arrays = [*fixed, *np.ascontiguousarray(outcomes.inputs.T)]
-    return pa.Table.from_arrays([pa.array(array) for array in arrays], schema=schema)
+def table_of(first: int, chunks: Sequence[Outcomes], plan: Plan, schema: pa.Schema) -> pa.Table:
+    """Consecutive chunks as a table, from the number of their first trial on."""
+    outcomes = chunks[0] if len(chunks) == 1 else _joined(chunks)
+    fixed = [column.values(first, outcomes, plan.scenario) for column in _own(plan).values()]
+    inputs = () if outcomes.inputs is None else np.ascontiguousarray(outcomes.inputs.T)
+    return pa.Table.from_arrays([pa.array(array) for array in (*fixed, *inputs)], schema=schema)
 
 
-def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "sampled") -> str | None:
-    """What no study could have written, in words; None where every row of a chunk can be how a game ended."""
-    first = chunk * CHUNK
+def _joined(chunks: Sequence[Outcomes]) -> Outcomes:
+    kind, defender, time, diverged = (np.concatenate([chunk[i] for chunk in chunks]) for i in range(4))
+    inputs, passed = (
+        None if part[0] is None else np.concatenate(part) for part in zip(*(c[4:] for c in chunks), strict=True)
+    )
+    return Outcomes(kind, defender, time, diverged, inputs, passed)
+
+
+def tally_of(table: pa.Table, plan: Plan) -> Tally:
+    """How many rows of a table ended in each way at each step."""
     kind, defender, time, diverged = (table[name].to_numpy() for name in ("kind", "defender", "time", "diverged"))
-    with np.errstate(invalid="ignore"):
-        count = time / sc.horizon * sc.steps  # δ may differ from T / K in the last digits
-        on_grid = np.abs(count - np.round(count)) <= max(1e-6, 1e-15 * sc.steps)
-    on_grid |= termination == "continuous"
+    return plan.tally(Outcomes(kind, defender, time, diverged, None))
+
+
+def flaw(table: pa.Table, first: int, sc: Scenario, termination: Termination = "sampled") -> str | None:
+    """What no study could have written, in words; None where every row can be how a game ended."""
+    kind, defender, time, diverged = (table[name].to_numpy() for name in ("kind", "defender", "time", "diverged"))
+    _, on_grid = steps_of(time, sc.horizon, sc.steps, between=termination == "continuous")
     within = (time >= 0.0) & (time <= sc.horizon * (1.0 + 1e-9))
     last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon)
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
     known = np.isin(kind, list(OutcomeKind))
-    same = pc.equal(
-        pc.cast(table["outcome"], pa.string()),
-        pc.cast(_outcome(kind * known, one * defender, diverged, sc), pa.string()),
+    same = _words(table, outcome_names(sc.n)) == np.asarray(
+        _outcome(kind * known, one * defender, diverged, sc).indices
     )
     when = "a time" if termination == "continuous" else "an instant of the grid"
     rules = {
@@ -149,7 +161,7 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "
         "kind": (known, "a code of tadcore.OutcomeKind"),
         "defender": (one, "a defender where one intercepted, and -1 elsewhere"),
         "time": (on_grid & within & last, f"{when} up to T = {sc.horizon:g}, for a timeout T itself"),
-        "outcome": (same.to_numpy(), "what kind, defender and diverged say"),
+        "outcome": (same, "what kind, defender and diverged say"),
     }
     for name, (holds, rule) in rules.items():
         if not holds.all():
@@ -158,19 +170,33 @@ def flaw(table: pa.Table, chunk: int, sc: Scenario, termination: Termination = "
     return None
 
 
-def digest(table: pa.Table) -> str:
-    """SHA-256 of every number of a table, column after column; ``outcome`` says nothing that they do not.
+def _words(table: pa.Table, names: list[str]) -> NDArray[np.int32]:
+    """The place of every outcome among the names; -1 for what is none of them."""
+    found = []
+    for chunk in table["outcome"].chunks:
+        places = [names.index(word) if word in names else -1 for word in chunk.dictionary.to_pylist()]
+        found.append(np.array([*places, -1], dtype=np.int32)[chunk.indices.to_numpy(zero_copy_only=False)])
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.int32)
+
+
+def digests(table: pa.Table) -> list[str]:
+    """SHA-256 of every number of each chunk, column after column; ``outcome`` says nothing that they do not.
 
     The checksums of Parquet cover its pages alone: a bit that flips in the footer can make whole pages read as others.
     """
+    columns = [column.to_numpy() for column in table.drop_columns(["outcome"]).columns]
+    return [_digest([column[start : start + CHUNK] for column in columns]) for start in range(0, len(table), CHUNK)]
+
+
+def _digest(columns: Sequence[NDArray[Any]]) -> str:
     total = hashlib.sha256()
-    for column in table.drop_columns(["outcome"]).columns:
-        total.update(column.to_numpy().tobytes())
+    for column in columns:
+        total.update(column.data)
     return total.hexdigest()
 
 
-def encoded(table: pa.Table, metadata: dict[str, str]) -> bytes:
-    """A table as the bytes of a Parquet file, with more metadata, and with checksums on its pages."""
+def encoded(table: pa.Table, metadata: Mapping[str, str]) -> memoryview:
+    """A table as the bytes of a Parquet file, a group of rows for each chunk, with checksums on its pages."""
     sink = pa.BufferOutputStream()
     pq.write_table(
         table.replace_schema_metadata({**table.schema.metadata, **metadata}),
@@ -178,7 +204,8 @@ def encoded(table: pa.Table, metadata: dict[str, str]) -> bytes:
         version="2.6",
         compression="zstd",
         use_dictionary=["outcome", "kind", "defender", "time"],
+        column_encoding={"trial": "DELTA_BINARY_PACKED"},
         row_group_size=CHUNK,
         write_page_checksum=True,
     )
-    return sink.getvalue().to_pybytes()  # type: ignore[no-any-return]
+    return memoryview(sink.getvalue())

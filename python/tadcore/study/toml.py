@@ -7,6 +7,7 @@
     seed = 7                     # 0 by default
     design = "sobol"             # "random" by default, or "latin"
     termination = "continuous"   # "sampled" by default
+    keep = "outcomes"            # "all" by default, or "counts"
     passes = true                # a column of passes within a capture radius; false by default
 
     [vary]
@@ -37,6 +38,7 @@ _KEYS = {
     "design": '"random", "sobol" or "latin"',
     "termination": '"sampled" or "continuous"',
     "passes": "true or false",
+    "keep": '"all", "outcomes" or "counts"',
     "vary": "a table of paths and samplers",
 }
 
@@ -59,7 +61,9 @@ def parse_study(text: str, name: str, folder: Path) -> dict[str, Any]:
     if not isinstance(data["vary"], dict):
         raise ScenarioError("vary", data["vary"], _KEYS["vary"])
     vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(data["vary"]).items()}
-    options: dict[str, Any] = {key: data[key] for key in ("seed", "design", "termination", "passes") if key in data}
+    options: dict[str, Any] = {
+        key: data[key] for key in ("seed", "design", "termination", "passes", "keep") if key in data
+    }
     return {"sc": _scenario(data["scenario"], folder), "vary": vary, "trials": data["trials"], **options}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,13 +12,16 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore.game.outcome import kind_counts
+from tadcore.game.outcome import DIVERGED
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath
 from tadcore.simulation.termination import Termination
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
+from tadcore.statistics.outcomes import KINDS
 from tadcore.statistics.stopping import Stopping
+from tadcore.statistics.tally import Tally
 
+from .rows import Rows
 from .table import FIXED, PASSED
 
 if TYPE_CHECKING:
@@ -31,14 +35,36 @@ class Trials:
 
     scenario: Scenario
     seed: int
-    table: pa.Table
+    rows: Rows
     stopping: Stopping | None = None
     termination: Termination = "sampled"
 
     @property
     def trials(self) -> int:
         """Trials in the table: as many as were asked for, or fewer where a rule stopped the study or it was cut off."""
-        return int(self.table.num_rows)
+        return self.rows.trials
+
+    @cached_property
+    def table(self) -> pa.Table:
+        """One row for each trial, all in memory; `pieces` reads them part by part.
+
+        Raises
+        ------
+        ScenarioError
+            The study keeps counts alone.
+        OutOfMemoryError
+            The rows take more than 4 GiB.
+        """
+        return self.rows.table()
+
+    def pieces(self) -> Iterator[pa.Table]:
+        """The rows in their order, as tables of at most half a million: what a store holds is read part by part."""
+        return self.rows.pieces()
+
+    @property
+    def tally(self) -> Tally:
+        """How many trials ended in each way at each step, whatever is kept of them."""
+        return self.rows.tally
 
     @cached_property
     def kind(self) -> NDArray[np.int8]:
@@ -66,7 +92,7 @@ class Trials:
 
         None where the study did not look for that: ``Study(…, passes=True)``.
         """
-        return self._column("passed") if "passed" in self.table.column_names else None
+        return self._column("passed") if "passed" in self.rows.names else None
 
     @cached_property
     def inputs(self) -> dict[str, Floats]:
@@ -75,11 +101,13 @@ class Trials:
         Any spelling of a path finds it: ``inputs["d1.visibility_radius"]``.
         """
         own = FIXED | PASSED
-        return ByPath({name: self._column(name) for name in self.table.column_names if name not in own})
+        return ByPath({name: self._column(name) for name in self.rows.names if name not in own})
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""
-        return kind_counts(self.kind, self.diverged)
+        *kinds, lost = (int(count) for count in self.tally.kinds())
+        counts = dict(zip(KINDS, kinds, strict=True))
+        return counts | {DIVERGED: lost} if lost else counts
 
     def probabilities(
         self, *, level: float | None = None, method: Literal["wilson", "exact", "sequence"] | None = None
@@ -145,8 +173,7 @@ class Trials:
         return frame
 
     def _column(self, name: str) -> NDArray[Any]:
-        array: NDArray[Any] = self.table[name].to_numpy()
-        return array
+        return self.rows.column(name)
 
     def __len__(self) -> int:
         return self.trials

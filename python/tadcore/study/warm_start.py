@@ -47,6 +47,19 @@ def warm(sc: Scenario, path: Path | None) -> Iterator[None]:
             warnings.warn(f"{path}: the table was not saved ({error.strerror})", RuntimeWarning, stacklevel=4)
 
 
+_read: set[tuple[int, Path]] = set()
+
+
+def read_once(sc: Scenario, path: Path) -> None:
+    """Read the table in a worker, before its first chunk; what cannot be read costs time and nothing else."""
+    game = game_of(sc)
+    if (id(game), path) not in _read:
+        _read.add((id(game), path))
+        with contextlib.suppress(ValueError, OSError):
+            if path.is_file():
+                _load(game, path)
+
+
 def _is_table(path: Path) -> bool:
     """Whether there is a table to read, whole or not; raises `ScenarioError` for what must not be replaced by one."""
     rule = "a table that a study has saved, or a new name"

@@ -1,20 +1,36 @@
-"""Who computes the chunks of a study: this process, one after another, or the workers of an executor."""
+"""Who plays the chunks of a study: threads of this process, or the workers of an executor.
+
+Both get groups of consecutive chunks, as many as take a good while at the speed that was measured so far: fewer at the
+beginning and at the end, so that nobody waits long for the last.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import pickle
-from collections.abc import Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from typing import TypeAlias
+import queue
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
 
+from tadcore._core import Stop
+from tadcore._shared.threads import cores
 from tadcore.errors import ScenarioError, TadcoreError
+from tadcore.sampling.base import Sampler
+from tadcore.sampling.design import CHUNK, Design
+from tadcore.scenario.model import Scenario
+from tadcore.simulation.termination import Termination
 
-from .plan import Outcomes, Plan, run_chunk
+from .keeping import Keep
+from .plan import Plan, Played, Task
+from .warm_start import read_once
 
-Job: TypeAlias = tuple[int, int]
-"""A chunk and how many of its trials are wanted."""
-
+_HERE, _ELSEWHERE = 0.25, 1.5  # seconds of work in a group
+_MOST, _MOST_COUNTED = (
+    64,
+    4096,
+)  # chunks in a group: of what comes back row by row, and of what is counted where it is played
 _UNKNOWN_WORKERS = 64
 
 
@@ -22,54 +38,164 @@ class LostWorkerError(Exception):
     """A worker died; the study that knows what is kept says so to the user."""
 
 
-def computed(
-    plan: Plan, jobs: Sequence[Job], executor: Executor | None, threads: int | None
-) -> Generator[tuple[int, Outcomes]]:
-    """Every job's chunk and outcomes as they are finished: in order in this process, in any order from an executor."""
-    if executor is None:
-        return ((chunk, plan.run(chunk, rows, threads)) for chunk, rows in jobs)
-    return _submitted(plan, jobs, executor, 1 if threads is None else threads)
+class Wanted(NamedTuple):
+    """What is to be played."""
+
+    chunks: Sequence[int]
+    """In ascending order."""
+    trials: int
+    """Of the whole study: the last of all chunks may be cut."""
+    keep: Keep
+    apart: bool
+    """Whether every chunk is counted by itself."""
 
 
-def _submitted(plan: Plan, jobs: Sequence[Job], executor: Executor, threads: int) -> Generator[tuple[int, Outcomes]]:
-    """Keep a bounded number of chunks in flight, enough for every worker to have the next one at hand."""
-    workers = getattr(executor, "_max_workers", None)
-    bound = 2 * (workers if isinstance(workers, int) else _UNKNOWN_WORKERS)
-    fixed = (plan.scenario.to_toml(), plan.vary, plan.seed, plan.design, plan.termination, plan.passes)
-    waiting = iter(jobs)
-    running: dict[Future[Outcomes], int] = {}
+class Groups:
+    """Groups of consecutive chunks, sized by the speed of those that came back."""
 
-    def submit() -> None:
-        for chunk, rows in waiting:
-            running[executor.submit(run_chunk, *fixed, chunk, rows, threads)] = chunk
-            if len(running) >= bound:
+    def __init__(self, wanted: Wanted, workers: int, seconds: float) -> None:
+        self._wanted, self._workers, self._seconds = wanted, workers, seconds
+        self._most = _MOST_COUNTED if wanted.keep == "counts" and not wanted.apart else _MOST
+        self._next = 0
+        self._speed = 0.0
+
+    @property
+    def left(self) -> int:
+        """Chunks that are in no group yet."""
+        return len(self._wanted.chunks) - self._next
+
+    def note(self, played: Played) -> None:
+        """Learn how fast one worker is."""
+        found = played.task.trials / max(played.seconds, 1e-6)
+        self._speed = found if not self._speed else 0.7 * self._speed + 0.3 * found
+
+    def take(self) -> Task | None:
+        """The next group; None where nothing is left."""
+        if not self.left:
+            return None
+        chunks, wanted = self._wanted.chunks, self._wanted
+        size = min(int(self._seconds * self._speed / CHUNK), self._most, self.left // (2 * self._workers))
+        first, last = self._next, self._next + 1
+        while last < len(chunks) and last - first < size and chunks[last] == chunks[last - 1] + 1:
+            last += 1
+        self._next = last
+        begin, end = chunks[first] * CHUNK, min((chunks[last - 1] + 1) * CHUNK, wanted.trials)
+        return Task(chunks[first], end - begin, wanted.keep, wanted.apart)
+
+
+def played_by(
+    plan: Plan, wanted: Wanted, executor: Executor | None, threads: int | None, table: Path | None = None
+) -> Generator[Played]:
+    """Every group as it is finished, in any order."""
+    if executor is not None:
+        return _elsewhere(plan, wanted, executor, 1 if threads is None else threads, table)
+    return _here(plan, wanted, cores() if threads is None else threads)
+
+
+def _here(plan: Plan, wanted: Wanted, threads: int) -> Generator[Played]:
+    """In threads that each draw, play and count: nothing of that needs the interpreter for long."""
+    workers = max(1, min(threads, 4 * cores(), len(wanted.chunks)))
+    stop, groups = Stop(), Groups(wanted, workers, _HERE)
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="tadcore-play")
+
+    def submit() -> tuple[Future[Played], Task] | None:
+        share = max(1, threads // max(1, min(workers, groups.left)))  # the last chunks have all threads
+        task = groups.take()
+        return None if task is None else (pool.submit(plan.run, task, share, stop), task)
+
+    try:
+        yield from _in_flight(plan, groups, submit, workers + 1)
+    finally:
+        stop.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _elsewhere(plan: Plan, wanted: Wanted, executor: Executor, threads: int, table: Path | None) -> Generator[Played]:
+    """Enough groups in flight for every worker to have the next one at hand."""
+    known = getattr(executor, "_max_workers", None)
+    workers = known if isinstance(known, int) else _UNKNOWN_WORKERS
+    groups = Groups(wanted, workers, _ELSEWHERE)
+    fixed = Sent(plan.scenario.to_toml(), plan.vary, plan.seed, plan.design, plan.termination, plan.passes, table)
+
+    def submit() -> tuple[Future[Played], Task] | None:
+        task = groups.take()
+        return None if task is None else (executor.submit(run_task, fixed, task, threads), task)
+
+    return _in_flight(plan, groups, submit, 2 * workers)
+
+
+def _in_flight(
+    plan: Plan, groups: Groups, submit: Callable[[], tuple[Future[Played], Task] | None], most: int
+) -> Generator[Played]:
+    """What comes back while at most so many groups are under way."""
+    running: dict[Future[Played], Task] = {}
+    finished: queue.SimpleQueue[Future[Played]] = queue.SimpleQueue()
+
+    def fill() -> None:
+        while len(running) < most:
+            with _told(plan):
+                submitted = submit()
+            if submitted is None:
                 return
+            running[submitted[0]] = submitted[1]
+            submitted[0].add_done_callback(finished.put)
 
     try:
         try:
-            with _told(plan):
-                submit()
+            fill()
         except RuntimeError as error:
             if "shutdown" not in str(error):
                 raise
-            raise ScenarioError("executor", executor, "open: this one has been shut down") from error
+            raise ScenarioError("executor", "an executor", "open: this one has been shut down") from error
         while running:
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
             # What is whole comes first, so that it is kept when a worker has died beside it.
-            for future in sorted(finished, key=lambda f: (f.cancelled() or f.exception() is not None, running[f])):
-                chunk = running.pop(future)
-                with _told(plan, chunk):
-                    outcomes = future.result()
-                yield chunk, outcomes
-            with _told(plan):
-                submit()
+            for future in sorted(_drained(finished), key=lambda f: (_failed(f), running[f].first)):
+                task = running.pop(future)
+                with _told(plan, task):
+                    played = future.result()
+                groups.note(played)
+                yield played
+            fill()
     finally:
         for future in running:
             future.cancel()
 
 
+def _drained(finished: queue.SimpleQueue[Future[Played]]) -> Iterator[Future[Played]]:
+    """All that is there, at least one."""
+    yield finished.get()
+    with contextlib.suppress(queue.Empty):
+        while True:
+            yield finished.get_nowait()
+
+
+def _failed(future: Future[Played]) -> bool:
+    return future.cancelled() or future.exception() is not None
+
+
+class Sent(NamedTuple):
+    """What a worker in another process makes the plan from."""
+
+    scenario: str
+    vary: dict[str, Sampler]
+    seed: int
+    design: Design
+    termination: Termination
+    passes: bool
+    table: Path | None
+
+
+def run_task(sent: Sent, task: Task, threads: int) -> Played:
+    """`Plan.run` in another process, which keeps its table of gains from group to group."""
+    sc = Scenario.from_toml_string(sent.scenario)
+    plan = Plan(sc, sent.vary, sent.seed, sent.design, sent.termination, sent.passes)
+    if sent.table is not None:
+        read_once(sc, sent.table)
+    return plan.run(task, threads)
+
+
 @contextlib.contextmanager
-def _told(plan: Plan, chunk: int | None = None) -> Iterator[None]:
+def _told(plan: Plan, task: Task | None = None) -> Iterator[None]:
     """Tell a dead worker and a sampler that cannot be pickled from an error of the user's own code."""
     try:
         yield
@@ -85,8 +211,10 @@ def _told(plan: Plan, chunk: int | None = None) -> Iterator[None]:
             if _of_pickling(error) and not _travels(sampler):
                 rule = "a sampler that can be sent to another process: a callable defined at the top of a module"
                 raise ScenarioError(f'vary["{path}"]', sampler, rule) from error
-        if chunk is not None:
-            error.add_note(f"(while computing chunk {chunk} of the study)")
+        if task is not None:
+            last = task.chunks()[-1][0]
+            which = f"chunk {task.first}" if last == task.first else f"chunks {task.first} to {last}"
+            error.add_note(f"(while computing {which} of the study)")
         raise
 
 

@@ -16,8 +16,16 @@ const POLL: Duration = Duration::from_millis(50);
 /// exception, once the work has noticed. A panic in the work becomes an ordinary exception, and so does a system that
 /// has no thread to give.
 pub(crate) fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&CancelToken) -> T + Send) -> PyResult<T> {
+    stoppable(py, CancelToken::new(), work)
+}
+
+/// The same with a token that somebody else may raise, too.
+pub(crate) fn stoppable<T: Send>(
+    py: Python<'_>,
+    token: CancelToken,
+    work: impl FnOnce(&CancelToken) -> T + Send,
+) -> PyResult<T> {
     let (outcome, raised) = py.detach(|| {
-        let token = CancelToken::new();
         let polled = token.clone();
         let (sender, receiver) = channel();
         thread::scope(|scope| {

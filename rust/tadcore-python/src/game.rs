@@ -19,6 +19,7 @@ use super::gains::Gains;
 use super::generation::Generation;
 use super::guard::guarded;
 use super::record::Record;
+use super::stop::Stop;
 use super::{detach, errors};
 
 /// Weights, horizon and grid; owns the equilibrium and the (step, topology) table.
@@ -210,7 +211,8 @@ impl Game {
     }
 
     /// Outcomes of many runs: kind, defender, time, whether the game diverged, and whether it passed within a radius.
-    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, continuous=false, passes=false, threads=None))]
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, continuous=false, passes=false, threads=None,
+        stop=None))]
     // A keyword for each rule.
     #[allow(clippy::type_complexity, clippy::too_many_arguments)]
     fn simulate_batch<'py>(
@@ -222,6 +224,7 @@ impl Game {
         continuous: bool,
         passes: bool,
         threads: Option<usize>,
+        stop: Option<&Stop>,
     ) -> PyResult<(
         Bound<'py, PyArray1<i8>>,
         Bound<'py, PyArray1<i32>>,
@@ -234,7 +237,8 @@ impl Game {
             let positions = copied(py, &positions)?;
             let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
             let policy = self.policy(py)?;
-            let ends = detach::interruptible(py, |cancel| {
+            let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
+            let ends = detach::stoppable(py, token, |cancel| {
                 let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
                 let between = Between { termination: termination(continuous), passes };
                 ensemble::run_with(&policy, &batch, between, threads, cancel)

@@ -11,6 +11,7 @@ mod game;
 mod generation;
 mod guard;
 mod record;
+mod stop;
 
 use guard::guarded;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -29,6 +30,8 @@ mod _core {
     use super::game::Game;
     #[pymodule_export]
     use super::record::Record;
+    #[pymodule_export]
+    use super::stop::Stop;
     use super::*;
 
     /// Who sees whom at positions of shape (n + 2, dim), shape (m, N), by the arithmetic of a run.

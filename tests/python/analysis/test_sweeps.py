@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import tadcore
-from study_cases import CHUNK, ESCAPE, escaping, parts, study
+from study_cases import CHUNK, ESCAPE, escaping, part, parts, study
 from tadcore import ScenarioError, Study, sweep
 from tadcore.sampling import Box
 from tadcore.statistics import proportion_interval
+from tadcore.study.plan import Plan
 
 
 def test_every_cell_is_the_study_of_its_scenario():
@@ -73,13 +74,11 @@ def test_a_store_holds_every_cell_and_grows_with_the_grid(tmp_path, monkeypatch)
     first = sweep(base, {"horizon": [0.5, 1.0]}, store=tmp_path)
     folders = sorted(path.name for path in tmp_path.iterdir())
     assert [name.rpartition("-")[0] for name in folders] == ["horizon=0.5", "horizon=1.0"]
-    assert len(parts(tmp_path / folders[0])) == 2
+    assert list(parts(tmp_path / folders[0])) == [part(0, CHUNK + 10)]
     assert tadcore.load_study(tmp_path / folders[1]).table.equals(first.cells[1].result.table)
     played = []
-    real = tadcore.simulate_batch
-    monkeypatch.setattr(
-        "tadcore.study.plan.simulate_batch", lambda sc, *a, **k: played.append(sc.horizon) or real(sc, *a, **k)
-    )
+    real = Plan.play
+    monkeypatch.setattr(Plan, "play", lambda plan, *a: played.append(plan.scenario.horizon) or real(plan, *a))
     second = sweep(base, {"horizon": [1.0, 0.25, 0.5]}, store=tmp_path)
     assert set(played) == {0.25}
     assert second.cells[2].result.table.equals(first.cells[0].result.table)
@@ -113,7 +112,7 @@ def test_a_grid_that_cannot_be_swept_is_refused_before_any_cell_runs(grid, words
 def test_the_draws_of_every_cell_are_checked_before_any_runs(monkeypatch, tmp_path):
     base = study(3 * CHUNK, vary={"d1.visibility_radius": Box(0.5, 4.0)})
     smallest = float(base.inputs()["defenders.0.visibility_radius"].min())
-    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    monkeypatch.setattr("tadcore.study.plan.Plan.play", lambda *_, **__: pytest.fail("a game was played"))
     with pytest.raises(ScenarioError, match=rf"trial [\d,]+: got .* capture radius, {smallest!r}") as caught:
         sweep(base, {"d1.capture_radius": [0.1, 0.2, smallest]}, store=tmp_path / "store")
     assert caught.value.__notes__ == [f"(in the cell defenders.0.capture_radius = {smallest!r})"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tadcore
-from study_cases import calm, resealed, study
+from study_cases import calm, part, resealed, study
 from tadcore import Scenario, ScenarioError, StoreError
 from tadcore._shared.toml import parse_toml
 from tadcore.cli.app import main
@@ -49,7 +49,7 @@ def test_what_is_no_file_is_refused_before_it_is_opened(tmp_path, kind, read):
 
 
 @KINDS
-@pytest.mark.parametrize("name", ["_manifest.json", "part-000000.parquet"])
+@pytest.mark.parametrize("name", ["_manifest.json", part(0, 300)])
 def test_what_is_no_file_is_refused_in_a_store(tmp_path, kind, name):
     folder = tmp_path / "store"
     study(300).run(store=folder)
@@ -88,10 +88,10 @@ def test_links_that_lead_nowhere_or_in_circles_are_named(tmp_path, capsys):
     assert "must be a file" in capsys.readouterr().err
     folder = tmp_path / "store"
     study(300).run(store=folder)
-    for target in (tmp_path / "nowhere", folder / "part-000000.parquet"):
-        (folder / "part-000000.parquet").unlink()
-        (folder / "part-000000.parquet").symlink_to(target)
-        with pytest.raises(StoreError, match=r"part-000000\.parquet"):
+    for target in (tmp_path / "nowhere", folder / part(0, 300)):
+        (folder / part(0, 300)).unlink()
+        (folder / part(0, 300)).symlink_to(target)
+        with pytest.raises(StoreError, match=part(0, 300)):
             tadcore.load_study(folder)
 
 
@@ -99,11 +99,11 @@ def test_a_part_that_is_a_link_is_read_only_if_it_is_the_part(tmp_path):
     one, other = tmp_path / "one", tmp_path / "other"
     whole = study(300).run(store=one)
     study(300, seed=8).run(store=other)
-    (one / "part-000000.parquet").rename(tmp_path / "elsewhere")
-    (one / "part-000000.parquet").symlink_to(tmp_path / "elsewhere")
+    (one / part(0, 300)).rename(tmp_path / "elsewhere")
+    (one / part(0, 300)).symlink_to(tmp_path / "elsewhere")
     assert tadcore.load_study(one).table.equals(whole.table)
-    (one / "part-000000.parquet").unlink()
-    (one / "part-000000.parquet").symlink_to(other / "part-000000.parquet")
+    (one / part(0, 300)).unlink()
+    (one / part(0, 300)).symlink_to(other / part(0, 300))
     with pytest.raises(StoreError, match="it belongs to another study"):
         tadcore.load_study(one)
 

@@ -14,10 +14,18 @@ import pyarrow.parquet as pq
 import pytest
 
 import tadcore
-from study_cases import CHUNK, calm, parts, study
+from study_cases import CHUNK, calm, part, parts, study
 from tadcore import OutcomeKind, StoreError
 
 NAMES = ["timeout", "captured", "d1", "d2", "d3", "diverged"]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def small_parts():
+    """A part for every chunk, so that a store of a few chunks has several."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tadcore.study.parts.GROUP", 1)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +102,10 @@ def test_polars_and_duckdb_read_the_parts(clean):
 
 def test_a_part_explains_itself(clean):
     result, folder = clean
-    schema = pq.read_schema(folder / "part-000001.parquet")
+    schema = pq.read_schema(folder / part(1, 500))
     about = {key.decode(): value.decode() for key, value in schema.metadata.items()}
     assert about["tadcore_version"] == tadcore.__version__
-    assert (about["tadcore_seed"], about["tadcore_design"], about["tadcore_chunk"]) == ("7", "random", "1")
+    assert (about["tadcore_seed"], about["tadcore_design"], about["tadcore_first"]) == ("7", "random", "8192")
     assert tadcore.Scenario.from_toml_string(about["tadcore_scenario"]) == result.scenario
     columns = json.loads(about["tadcore_columns"])
     assert list(columns) == schema.names == result.table.schema.names
@@ -116,7 +124,7 @@ def test_a_store_of_an_earlier_format_is_named(clean, tmp_path):
     before = parts(old)
     for use in (tadcore.load_study, lambda folder: study().run(store=folder)):
         with pytest.raises(
-            StoreError, match=r"manifest\.json: it has format 1 or 2, and this version of tadcore reads 3"
+            StoreError, match=r"manifest\.json: it has format 1 or 2, and this version of tadcore reads 4"
         ):
             use(old)
     assert parts(old) == before
@@ -180,7 +188,7 @@ FORGED = {
 @pytest.mark.parametrize("chunk", [0, 1])
 def test_a_part_that_no_study_wrote_is_named(copied, name, chunk):
     change, found = FORGED[name]
-    path = copied / f"part-00000{chunk}.parquet"
+    path = copied / part(chunk, (CHUNK, 500)[chunk])
     written_anew(path, change)
     for use in (tadcore.load_study, lambda folder: study(CHUNK + 500).run(store=folder)):
         with pytest.raises(StoreError, match=rf"no outcomes of this study \(.*{found}") as caught:
@@ -190,19 +198,19 @@ def test_a_part_that_no_study_wrote_is_named(copied, name, chunk):
 
 
 def test_a_part_written_anew_without_a_change_is_read(copied, clean):
-    written_anew(copied / "part-000000.parquet", lambda columns: None)
+    written_anew(copied / part(0), lambda columns: None)
     loaded = tadcore.load_study(copied)
     assert loaded.table.equals(clean[0].table)
     assert list(loaded.to_pandas()["outcome"].cat.categories) == NAMES
 
 
 def test_a_part_without_words_is_named(copied):
-    path = copied / "part-000000.parquet"
+    path = copied / part(0)
     table = pq.read_table(path)
     place = table.schema.get_field_index("outcome")
     field = pa.field("outcome", pa.string(), nullable=False)
     pq.write_table(table.set_column(place, field, table["outcome"].cast(pa.string())), path)
-    with pytest.raises(StoreError, match=r"part-000000\.parquet: its columns are"):
+    with pytest.raises(StoreError, match=rf"{part(0)}: its columns are"):
         tadcore.load_study(copied)
 
 

@@ -19,12 +19,20 @@ import pytest
 from scipy import stats
 
 import tadcore
-from study_cases import CHUNK, edited, parts, resealed, ring, study
+from study_cases import CHUNK, edited, part, parts, resealed, ring, study
 from tadcore import StoreError
 from tadcore.sampling import Box, Choice
 from tadcore.study.manifest import Manifest
 
 HERE = Path(__file__).parents[1]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def small_parts():
+    """A part for every chunk, so that a store of a few chunks has several."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tadcore.study.parts.GROUP", 1)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +51,7 @@ def copied(clean, tmp_path):
 def test_a_store_says_what_it_holds(clean):
     result, folder = clean
     assert {path.name for path in folder.iterdir()} <= {"_manifest.json", "_store.lock", *parts(folder)}
-    assert list(parts(folder)) == [f"part-00000{i}.parquet" for i in range(3)]
+    assert list(parts(folder)) == [part(0), part(1), part(2, 500)]
     manifest = json.loads((folder / "_manifest.json").read_text(encoding="utf-8"))
     assert manifest["trials"] == result.trials == 2 * CHUNK + 500
     assert (manifest["seed"], manifest["design"], manifest["chunk"]) == (7, "random", CHUNK)
@@ -51,9 +59,9 @@ def test_a_store_says_what_it_holds(clean):
     assert manifest["vary"]["attacker.position"] == {"disk": {"center": [0.0, 1.0], "radius": 2.0}}
     assert tadcore.Scenario.from_toml_string(manifest["scenario"]) == result.scenario
     assert manifest["environment"]["numpy"] == np.__version__
-    about = pq.read_metadata(folder / "part-000002.parquet").metadata
+    about = pq.read_metadata(folder / part(2, 500)).metadata
     assert about[b"tadcore_study"].decode() == manifest["study_sha256"]
-    assert (about[b"tadcore_chunk"], about[b"tadcore_rows"]) == (b"2", b"500")
+    assert (about[b"tadcore_first"], about[b"tadcore_rows"]) == (b"16384", b"500")
 
 
 def test_a_study_is_read_back_from_its_store_alone(clean):
@@ -84,9 +92,11 @@ def test_readers_of_parquet_need_nothing_of_ours(clean):
 KILLED = """
 import sys, time
 from study_cases import CHUNK, study
-from tadcore.study.store import Store
-write = Store.write
-Store.write = lambda *given: (time.sleep(0.05), write(*given))  # slow enough to be met on the way
+from tadcore.study import parts
+from tadcore.study.plan import Plan
+parts.GROUP = 1
+play = Plan.play
+Plan.play = lambda *given: (time.sleep(0.05), play(*given))[1]  # slow enough to be met on the way
 study(20 * CHUNK).run(store=sys.argv[1], threads=1)
 """
 
@@ -104,7 +114,8 @@ def test_kill_9_loses_only_what_was_in_flight(tmp_path):
         assert wanted <= len(survived[-1]) < 20
     assert survived[0].items() <= survived[1].items()
     cut = tadcore.load_study(folder)
-    assert cut.trials == len(survived[1]) * CHUNK
+    missing = next(chunk for chunk in range(20) if part(chunk) not in survived[1])
+    assert cut.trials == missing * CHUNK >= CHUNK
     assert "163,840 trials" in repr(cut)
     (folder / ".tadcore-abc.parquet").write_bytes(b"half a part")
     result = study(20 * CHUNK).run(store=folder)
@@ -117,6 +128,8 @@ def test_kill_9_loses_only_what_was_in_flight(tmp_path):
 FORKED = """
 import concurrent.futures, multiprocessing, sys
 from study_cases import CHUNK, study
+from tadcore.study import parts
+parts.GROUP = 1
 with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
     study(20 * CHUNK).run(store=sys.argv[1], executor=pool)
 """
@@ -135,7 +148,7 @@ def test_workers_that_outlive_a_killed_run_do_not_hold_its_store(tmp_path):
 
 
 def test_finished_chunks_are_not_played_again(copied, clean, monkeypatch):
-    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    monkeypatch.setattr("tadcore.study.plan.Plan.play", lambda *_, **__: pytest.fail("a game was played"))
     assert study().run(store=copied).table.equals(clean[0].table)
     shorter = study(CHUNK + 7).run(store=copied)
     assert shorter.table.equals(clean[0].table.slice(0, CHUNK + 7))
@@ -144,12 +157,12 @@ def test_finished_chunks_are_not_played_again(copied, clean, monkeypatch):
 
 
 def test_a_missing_part_is_played_again_alone(copied, clean):
-    (copied / "part-000001.parquet").unlink()
+    (copied / part(1)).unlink()
     assert tadcore.load_study(copied).trials == CHUNK
-    before = (copied / "part-000000.parquet").stat().st_mtime_ns
+    before = (copied / part(0)).stat().st_mtime_ns
     assert study().run(store=copied).table.equals(clean[0].table)
     assert parts(copied) == parts(clean[1])
-    assert (copied / "part-000000.parquet").stat().st_mtime_ns == before
+    assert (copied / part(0)).stat().st_mtime_ns == before
 
 
 def test_more_trials_extend_a_store(copied, clean, tmp_path):
@@ -215,36 +228,34 @@ def flipped(data):
 )
 @pytest.mark.parametrize("use", [lambda folder: study().run(store=folder), tadcore.load_study])
 def test_a_truncated_or_damaged_part_is_named(copied, clean, change, words, use):
-    spoiled(copied, "part-000001.parquet", change)
+    spoiled(copied, part(1), change)
     with pytest.raises(StoreError, match=words) as caught:
         use(copied)
-    assert caught.value.path == str(copied / "part-000001.parquet")
+    assert caught.value.path == str(copied / part(1))
     assert "delete this file and run the study again" in str(caught.value)
-    (copied / "part-000001.parquet").unlink()
+    (copied / part(1)).unlink()
     assert study().run(store=copied).table.equals(clean[0].table)
 
 
 def test_a_foreign_part_is_named(copied, tmp_path):
     study(CHUNK, seed=8).run(store=tmp_path / "other")
-    shutil.copy(tmp_path / "other" / "part-000000.parquet", copied)
-    with pytest.raises(StoreError, match=r"part-000000\.parquet: it belongs to another study"):
+    shutil.copy(tmp_path / "other" / part(0), copied)
+    with pytest.raises(StoreError, match=rf"{part(0)}: it belongs to another study"):
         study().run(store=copied)
-    shutil.copy(copied / "part-000001.parquet", copied / "part-000000.parquet")
-    with pytest.raises(StoreError, match=r"part-000000\.parquet: it holds chunk 1, not 0"):
+    shutil.copy(copied / part(1), copied / part(0))
+    with pytest.raises(StoreError, match=rf"{part(0)}: it holds the trials from 8192 on, not from 0"):
         tadcore.load_study(copied)
-    pq.write_table(
-        pq.read_table(copied / "part-000001.parquet").replace_schema_metadata(None), copied / "part-000000.parquet"
-    )
-    with pytest.raises(StoreError, match=r"part-000000\.parquet: it belongs to no study"):
+    pq.write_table(pq.read_table(copied / part(1)).replace_schema_metadata(None), copied / part(0))
+    with pytest.raises(StoreError, match=rf"{part(0)}: it belongs to no study"):
         tadcore.load_study(copied)
-    (copied / "part-000000.parquet").rename(copied / "part-mine.parquet")
+    (copied / part(0)).rename(copied / "part-mine.parquet")
     with pytest.raises(StoreError, match=r"part-mine\.parquet: its name is not that of a part"):
         tadcore.load_study(copied)
 
 
-@pytest.mark.parametrize(("drop", "words"), [(["time"], "its columns are"), ([], r"it has 8191 rows, and says 8192")])
+@pytest.mark.parametrize(("drop", "words"), [(["time"], "its columns are"), ([], r"it has 8191 rows, says 8192")])
 def test_a_part_with_other_columns_or_rows_is_named(copied, drop, words):
-    path = copied / "part-000000.parquet"
+    path = copied / part(0)
     table = pq.read_table(path)
     pq.write_table(table.drop_columns(drop) if drop else table.slice(1), path)
     with pytest.raises(StoreError, match=words):
@@ -259,11 +270,11 @@ def test_a_manifest_that_is_none_is_named(copied, tmp_path):
             with pytest.raises(StoreError, match=r"manifest\.json: its digest does not fit.*put back a copy"):
                 use(copied)
             (copied / "_manifest.json").write_bytes(before)
-    for other in (1, 2, 99):
+    for other in (1, 2, 3, 99):
         edited(copied, format=other)
-        with pytest.raises(StoreError, match=f"it has format {other}, and this version of tadcore reads 3; read"):
+        with pytest.raises(StoreError, match=f"it has format {other}, and this version of tadcore reads 4; read"):
             study().run(store=copied)
-    resealed(copied, format=3, tadcore_version="0.0.1")
+    resealed(copied, format=4, tadcore_version="0.0.1")
     assert tadcore.load_study(copied).trials == study().trials
     with pytest.raises(StoreError, match=r"written by tadcore 0\.0\.1"):
         study().run(store=copied)
@@ -324,7 +335,7 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, clean):
     folder = tmp_path / "store"
     study(CHUNK).run(store=folder)
     before = parts(folder)
-    with small_files(20_000), pytest.raises(StoreError, match=r"part-000001\.parquet: it cannot be written") as caught:
+    with small_files(20_000), pytest.raises(StoreError, match=r"part-[-\d]+\.parquet: it cannot be written") as caught:
         study().run(store=folder)
     assert isinstance(caught.value.__cause__, OSError)
     assert parts(folder) == before

@@ -283,7 +283,7 @@ NINTH = round(float(ring(np.random.Generator(np.random.Philox(key=np.array([7, 1
     ],
 )
 def test_a_bad_draw_is_refused_before_anything_runs(vary, words, monkeypatch, tmp_path):
-    monkeypatch.setattr("tadcore.study.plan.simulate_batch", lambda *_, **__: pytest.fail("a game was played"))
+    monkeypatch.setattr("tadcore.study.plan.Plan.play", lambda *_, **__: pytest.fail("a game was played"))
     with pytest.raises(ScenarioError, match=words):
         study(2 * CHUNK, vary=vary).run(store=tmp_path / "store")
     assert not (tmp_path / "store").exists()
@@ -313,7 +313,7 @@ def test_every_trial_of_a_long_study_is_checked_before_anything_runs(monkeypatch
     def played(*given, **named):
         raise PlayedError
 
-    monkeypatch.setattr("tadcore.study.plan.simulate_batch", played)
+    monkeypatch.setattr("tadcore.study.plan.Plan.play", played)
     wanted = study(trials, seed, vary={"d1.visibility_radius": stats.norm(1.0, spread)})
     bad = first_at_most(seed, trials, 1.0, spread, 0.1)
     if bad is None:

@@ -13,7 +13,7 @@ import pytest
 from scipy import stats
 
 import tadcore
-from study_cases import CHUNK, calm, parts
+from study_cases import CHUNK, calm
 from tadcore import ScenarioError, Study
 from tadcore.cli.app import main
 from tadcore.sampling import Annulus, Box, Choice, Cycle, Disk, Gaussian
@@ -167,7 +167,7 @@ def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path
     ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs) as process:
         os.close(theirs)
-        while process.poll() is None and len(parts(tmp_path / "out")) < 3:
+        while process.poll() is None and not list((tmp_path / "out").glob("part-*.parquet")):
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         shown = b""
@@ -186,4 +186,4 @@ def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path
         r"\| [\d.]+k/2\.46M \[\d\d:\d\d, +[\d.]+k/s, intercepted 0\.\d{3} captured 0\.\d{3} timeout 0\.\d{3}]", text
     )
     assert "interrupted; what was finished is in" in " ".join(text.split())
-    assert tadcore.load_study(tmp_path / "out").trials >= 3 * CHUNK
+    assert tadcore.load_study(tmp_path / "out").trials >= CHUNK

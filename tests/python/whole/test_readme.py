@@ -25,7 +25,7 @@ def test_python_blocks_run_in_order(
     assert "d1 intercepts the attacker at t = 1.395" in printed
     assert re.search(r"^1,000 trials$.*^intercepted +\d+ ", printed, flags=re.MULTILINE | re.DOTALL)
     assert all((tmp_path / name).stat().st_size > 10_000 for name in ("run.png", "shares.png"))
-    assert (tmp_path / "attackers" / "part-000000.parquet").is_file()
+    assert (tmp_path / "attackers" / "part-0000000000-0000001000.parquet").is_file()
 
 
 def test_commands_and_pictures_exist() -> None:

@@ -1,0 +1,110 @@
+"""Trials per second of a study beside those of its engine, and of everything but the engine.
+
+    python benches/pipeline.py               # the engine, a study, a study that is stored: one thread and two
+    python benches/pipeline.py --stub        # the engine answers at once: drawing, counting, encoding and writing alone
+
+Ratios are medians of rounds in one process, in which the columns take turns, so that other load meets all of them. The
+processor time a trial takes is printed too: on a machine that is shared it says more than the clock does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tadcore
+from tadcore import _core
+from tadcore.sampling import Box
+from tadcore.simulation.starts import rows_of
+from tadcore.study.plan import Plan
+
+VARY = {"*.position": Box([-3, -3], [3, 3])}
+
+
+def timed(work: Callable[[], Any], trials: int) -> tuple[float, float]:
+    """Trials per second, and nanoseconds of processor time a trial."""
+    began, used = time.perf_counter(), time.process_time()
+    work()
+    return trials / (time.perf_counter() - began), (time.process_time() - used) / trials * 1e9
+
+
+def stored(study: tadcore.Study, folder: Path, **options: Any) -> None:
+    """Run with a new store."""
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        study.run(store=place, **options)
+
+
+def real(trials: int, rounds: int, folder: Path) -> None:
+    """The engine beside studies around it."""
+    sc = tadcore.scenarios.load("paper-i1")
+    study = tadcore.Study(sc, VARY, trials=trials, seed=7)
+    rows = rows_of(sc, study.inputs(), trials)
+    study.run()  # fills the gain table
+    for threads in (1, 2):
+        columns = {
+            "simulate_batch": partial(tadcore.simulate_batch, sc, rows.positions, threads=threads),
+            "Study.run": partial(study.run, threads=threads),
+            "stored, all": partial(stored, study, folder, threads=threads),
+            "stored, outcomes": partial(stored, study, folder, threads=threads, keep="outcomes"),
+            "stored, counts": partial(stored, study, folder, threads=threads, keep="counts"),
+        }
+        found: dict[str, list[tuple[float, float]]] = {name: [] for name in columns}
+        for _ in range(rounds):
+            for name, work in columns.items():
+                found[name].append(timed(work, trials))
+        print(f"{threads} thread{'s' if threads > 1 else ''}, {_core.simd()}, {trials:,} trials, {rounds} rounds")
+        engine = found["simulate_batch"]
+        for name, values in found.items():
+            ratio = statistics.median(v[0] / e[0] for v, e in zip(values, engine, strict=True))
+            used = statistics.median(v[1] / e[1] for v, e in zip(values, engine, strict=True))
+            rate, best = statistics.median(v[0] for v in values), max(v[0] for v in values)
+            print(
+                f"  {name:<18} {rate:>12,.0f}/s  best {best:>12,.0f}/s  {ratio:5.2f} of it, {used:5.2f} times the CPU"
+            )
+
+
+def stub(trials: int, rounds: int, folder: Path) -> None:
+    """Everything but the engine: the outcomes are there at once, and vary as those of a study do."""
+    sc = tadcore.scenarios.load("paper-i1")
+    rng = np.random.default_rng(0)
+    kind = rng.integers(0, 3, 8192).astype(np.int8)
+    defender = np.where(kind == 2, rng.integers(0, sc.n, 8192), -1).astype(np.int32)
+    time_ = np.where(kind == 0, sc.horizon, rng.integers(0, sc.steps, 8192) * (sc.horizon / sc.steps))
+    diverged = np.zeros(8192, dtype=np.bool_)
+
+    class Instant:
+        """A game whose outcomes are there when they are asked for."""
+
+        def simulate_batch(self, starts: Any, *_: Any, **__: Any) -> tuple[Any, ...]:
+            m = len(starts)
+            return kind[:m], defender[:m], time_[:m], diverged[:m], diverged[:m]
+
+    study = tadcore.Study(sc, VARY, trials=trials, seed=7)
+    Plan.game = Instant()  # type: ignore[assignment,method-assign]
+    for keep in ("all", "outcomes", "counts"):
+        for threads in (1, 2):
+            work = partial(stored, study, folder, keep=keep, threads=threads)
+            found = [timed(work, trials) for _ in range(rounds)]
+            rate, used = max(f[0] for f in found), min(f[1] for f in found)
+            print(f"  {keep:<9} {threads} threads: best {rate:>12,.0f} trials/s, {used:6.0f} ns of CPU a trial")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--stub", action="store_true")
+    parser.add_argument("--trials", type=int, default=0)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--folder", type=Path, default=Path())
+    given = parser.parse_args()
+    if given.stub:
+        stub(given.trials or 2**23, given.rounds, given.folder)
+    else:
+        real(given.trials or 2**18, given.rounds, given.folder)

@@ -1,0 +1,116 @@
+"""The counts of a study as a file: how many trials ended in each way at each step, and nothing else of them.
+
+``counts-0000000000-0001000000.parquet`` counts the trials from the first number on, up to and without the second. A
+larger file takes the place of a smaller one as the study goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from tadcore._shared.files import MOST, strange
+from tadcore.errors import StoreError
+from tadcore.game.outcome import OutcomeKind
+from tadcore.statistics.tally import Tally
+
+from .manifest import faults
+from .plan import Plan
+from .table import outcome_names
+
+_NAME = re.compile(r"counts-(\d{10})-(\d{10})\.parquet")
+_LARGEST = 16 * MOST
+_AGAIN = "put back a copy of this file, or delete it and run the study again"
+
+
+class Counted(NamedTuple):
+    """Consecutive trials, counted."""
+
+    first: int
+    end: int
+    tally: Tally
+
+    @property
+    def name(self) -> str:
+        """The name of its file."""
+        return f"counts-{self.first:010d}-{self.end:010d}.parquet"
+
+
+def ranges_in(folder: Path) -> list[tuple[int, int, Path]]:
+    """The files of counts in a folder, by the first trial and then the largest first."""
+    found = []
+    with faults(folder):
+        paths = sorted(folder.glob("counts-*.parquet"))
+    for path in paths:
+        match = _NAME.fullmatch(path.name)
+        if match is None or int(match[1]) >= int(match[2]):
+            raise StoreError(str(path), "its name is not that of a file of counts", "move it out of this folder")
+        found.append((int(match[1]), int(match[2]), path))
+    return sorted(found, key=lambda entry: (entry[0], -entry[1]))
+
+
+def content_of(counted: Counted, plan: Plan, study: str) -> memoryview:
+    """The bytes of the file: a function of the counts and of the study alone."""
+    tally, sc = counted.tally, plan.scenario
+    names = outcome_names(sc.n)
+    lost = len(names) - 1
+    words = pa.DictionaryArray.from_arrays(
+        pa.array(np.where(tally.diverged, lost, tally.outcome).astype(np.int32)), pa.array(names)
+    )
+    by = tally.outcome >= OutcomeKind.INTERCEPTED
+    columns = {
+        "outcome": words,
+        "kind": pa.array(np.minimum(tally.outcome, OutcomeKind.INTERCEPTED).astype(np.int8)),
+        "defender": pa.array(np.where(by, tally.outcome - OutcomeKind.INTERCEPTED, -1).astype(np.int32)),
+        "diverged": pa.array(tally.diverged),
+        "step": pa.array(tally.step),
+        "trials": pa.array(tally.count),
+    }
+    said = {"study": study, "first": str(counted.first), "end": str(counted.end), "sha256": _digest(tally)}
+    table = pa.table(columns).replace_schema_metadata({f"tadcore_{key}": value for key, value in said.items()})
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, version="2.6", compression="zstd", write_page_checksum=True)
+    return memoryview(sink.getvalue())
+
+
+def read_counts(path: Path, first: int, end: int, plan: Plan, study: str) -> Counted:
+    """A file of counts, verified; raises `StoreError`."""
+    sc = plan.scenario
+    found = strange(path)
+    if found is not None:
+        raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ValueError(f"it has more than {_LARGEST >> 20} MiB")
+        with pq.ParquetFile(path, page_checksum_verification=True) as opened:
+            about = opened.metadata.metadata or {}
+            table = opened.read()
+        keys = ("study", "first", "end", "sha256")
+        said = {key: about.get(f"tadcore_{key}".encode(), b"").decode() for key in keys}
+        kind, defender, step, trials = (
+            table[name].to_numpy().astype(np.int64) for name in ("kind", "defender", "step", "trials")
+        )
+        code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+        cells = (2 * code + table["diverged"].to_numpy()) * (sc.steps + 1) + step
+    except (OSError, ValueError, KeyError, pa.ArrowException) as error:
+        raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
+    if said["study"] != study:
+        raise StoreError(str(path), "it belongs to another study", "move it out of this folder, or name another store")
+    tally = Tally(sc.n, sc.steps, cells, trials)
+    last = 2 * (len(OutcomeKind) - 1 + sc.n) * (sc.steps + 1)
+    whole = cells.size and cells[0] >= 0 and cells[-1] < last and (np.diff(cells) > 0).all() and (trials > 0).all()
+    if not whole or (said["first"], said["end"], said["sha256"]) != (str(first), str(end), _digest(tally)):
+        raise StoreError(str(path), "it is damaged (its counts are not those that were written)", _AGAIN)
+    if tally.trials != end - first:
+        raise StoreError(str(path), f"it counts {tally.trials:,} trials, and its name says {end - first:,}", _AGAIN)
+    return Counted(first, end, tally)
+
+
+def _digest(tally: Tally) -> str:
+    return hashlib.sha256(tally.cells.astype("<i8").tobytes() + tally.count.astype("<i8").tobytes()).hexdigest()

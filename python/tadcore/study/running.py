@@ -1,0 +1,64 @@
+"""A study, run: its options checked, its store opened, its chunks collected."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+from tadcore._shared.arrays import as_index
+from tadcore._shared.files import as_path
+from tadcore.errors import ScenarioError
+from tadcore.sampling.design import CHUNK
+from tadcore.statistics.stopping import Stopping
+
+from .collect import Collection, StoppingRule
+from .definition import Definition
+from .keepers import keeper_of
+from .keeping import Keep, as_keep
+from .progress import Progress
+from .rows import Rows
+from .store import Store
+from .warm_start import warm
+
+
+class Options(NamedTuple):
+    """The arguments of `tadcore.Study.run`."""
+
+    progress: bool | str
+    store: str | os.PathLike[str] | None
+    threads: int | None
+    executor: Executor | None
+    until: StoppingRule | None
+    table: str | os.PathLike[str] | None
+    keep: Keep | None
+
+
+def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None]:
+    """Play what the store does not have; raises what `tadcore.Study.run` says."""
+    executor, until, progress = options.executor, options.until, options.progress
+    threads = None if options.threads is None else as_index("threads", options.threads, 2**16, least=1)
+    if executor is not None and not isinstance(executor, Executor):
+        hint = ": client.get_executor()" if hasattr(executor, "get_executor") else ""
+        raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")
+    if until is not None and not isinstance(until, StoppingRule):
+        raise ScenarioError("until", until, "a stopping rule such as tadcore.statistics.HalfWidth(0.002)")
+    if until is not None and study.design != "random":
+        rule = "left out: its interval needs independent draws, which only design='random' gives"
+        raise ScenarioError("until", f"a rule for design={study.design!r}", rule)
+    folder = None if options.store is None else as_path("store", options.store)
+    table = None if options.table is None else as_path("table", options.table)
+    keep = study.keep if options.keep is None else as_keep(options.keep)
+    plan = study.plan
+    plan.check_ahead(study.trials, threads=threads, progress=bool(progress))
+    plan.game.equilibrium()
+    with contextlib.ExitStack() as running:
+        running.enter_context(warm(study.scenario, table))
+        store = None
+        if folder is not None:
+            store = running.enter_context(Store.writing(folder, study.manifest(keep), plan))
+        bar = running.enter_context(Progress(study.trials, wanted=progress))
+        keeper = keeper_of(plan, study.trials, keep, store)
+        collection = Collection(plan, study.trials, range(-(-study.trials // CHUNK)), keeper, bar, until)
+        return collection.gather(executor, threads, table), collection.stopping

@@ -1,0 +1,131 @@
+"""Chunks on their way to the disk: held until a part is whole or a second has passed, and written by other threads."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import pyarrow as pa
+
+from tadcore.sampling.design import CHUNK
+
+from . import parts
+from .manifest import faults
+from .parts import Part, name_of
+from .plan import Outcomes
+from .store import Store, write
+
+_PATIENCE = 1.0  # seconds that a finished chunk waits for its part to be whole
+_THREADS = 2
+_PENDING = 4  # parts that wait for the disk, at most: then the study waits, too
+
+
+class Writer:
+    """What writes the chunks of a store as they come, in any order.
+
+    Parameters
+    ----------
+    store : Store
+        Where they go.
+    chunks : iterable of int
+        Those that will come.
+    """
+
+    def __init__(self, store: Store, chunks: Iterable[int]) -> None:
+        self._store = store
+        self._left = Counter(chunk // parts.GROUP for chunk in chunks)
+        self._open: dict[int, dict[int, Outcomes]] = {}
+        self._since: dict[int, float] = {}
+        self._before: dict[int, list[Future[None]]] = {}
+        self._pending: deque[Future[None]] = deque()
+        self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="tadcore-store")
+
+    def add(self, chunk: int, outcomes: Outcomes) -> None:
+        """Take a chunk; raises what a write before it has met."""
+        group, now = chunk // parts.GROUP, time.monotonic()
+        self._open.setdefault(group, {})[chunk] = outcomes
+        self._since.setdefault(group, now)
+        self._left[group] -= 1
+        if not self._left[group]:
+            self._submit(group, join=True)
+        for waiting in [g for g, since in self._since.items() if now - since > _PATIENCE]:
+            self._submit(waiting, join=False)
+        while self._pending and (self._pending[0].done() or len(self._pending) > _PENDING):
+            self._pending.popleft().result()
+
+    def close(self) -> None:
+        """Bring everything to the disk, and join what lies side by side."""
+        try:
+            files = Counter(part.first // (parts.GROUP * CHUNK) for part in self._store.files)
+            for group in sorted(files.keys() | self._open.keys() | self._before.keys()):
+                if group in self._open or group in self._before or files[group] > 1:
+                    self._submit(group, join=True)
+            for future in self._pending:
+                future.result()
+        finally:
+            self._pool.shutdown(wait=True)
+
+    def _submit(self, group: int, *, join: bool) -> None:
+        self._since.pop(group, None)
+        chunks, before = self._open.pop(group, {}), self._before.pop(group, [])
+        future = self._pool.submit(self._put, group, chunks, before, join)
+        self._pending.append(future)
+        if not join:
+            self._before[group] = [future]
+
+    def _put(self, group: int, chunks: dict[int, Outcomes], before: list[Future[None]], join: bool) -> None:
+        """Write chunks, with ``join`` in one part with those of their group that are stored."""
+        for future in before:
+            future.result()  # begun before this one, since the pool takes them in their order
+        store = self._store
+        rows = {chunk: store.rows(chunk) for chunk in self._stored(group)} if join else {}
+        rows |= {chunk: len(outcomes.kind) for chunk, outcomes in chunks.items()}
+        for run in _runs(rows):
+            first, end = run.start * CHUNK, run[-1] * CHUNK + rows[run[-1]]
+            part = Part(store.folder / name_of(first, end), first, end)
+            if part not in store.files or any(chunk in chunks for chunk in run):
+                table = pa.concat_tables(self._tables(run, chunks))
+                write(part.path, store.format.bytes(first, table))
+            store.files.add(part)
+            for chunk in run:
+                store.parts[chunk] = part
+        if join:
+            self._sweep(group)
+
+    def _stored(self, group: int) -> list[int]:
+        return [chunk for chunk in range(group * parts.GROUP, (group + 1) * parts.GROUP) if chunk in self._store.parts]
+
+    def _tables(self, run: range, chunks: dict[int, Outcomes]) -> Iterator[pa.Table]:
+        """The rows of consecutive chunks: what is at hand, and between that what is stored."""
+        for at_hand, among in itertools.groupby(run, lambda chunk: chunk in chunks):
+            listed = list(among)
+            if at_hand:
+                yield self._store.format.table(listed[0] * CHUNK, [chunks[chunk] for chunk in listed])
+            else:
+                yield from (table for _, table in self._store.read(listed))
+
+    def _sweep(self, group: int) -> None:
+        """Remove the parts of a group whose rows larger ones have."""
+        in_use = {self._store.parts[chunk] for chunk in self._stored(group)}
+        for part in [part for part in self._store.files if part.first // (parts.GROUP * CHUNK) == group]:
+            if part not in in_use:
+                with faults(part.path):
+                    part.path.unlink(missing_ok=True)
+                self._store.files.discard(part)
+
+
+def _runs(rows: dict[int, int]) -> Iterator[range]:
+    """Consecutive chunks, of which only the last of each run may be cut."""
+    start = last = None
+    for chunk in sorted(rows):
+        if start is None or last is None:
+            start = chunk
+        elif chunk != last + 1 or rows[last] < CHUNK:
+            yield range(start, last + 1)
+            start = chunk
+        last = chunk
+    if start is not None and last is not None:
+        yield range(start, last + 1)
