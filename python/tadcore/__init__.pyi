@@ -17,12 +17,8 @@ from . import (
 )
 from ._core import __version__ as __version__
 from .analysis.maps import OutcomeMap as OutcomeMap, outcome_map as outcome_map
-from .analysis.placement import (
-    BestStart as BestStart,
-    ProbabilityMap as ProbabilityMap,
-    best_start as best_start,
-    probability_map as probability_map,
-)
+from .analysis.placement import BestStart as BestStart, best_start as best_start
+from .analysis.probabilities import ProbabilityMap as ProbabilityMap, probability_map as probability_map
 from .analysis.radius import radius_curve as radius_curve
 from .analysis.sweeps import SweepResult as SweepResult, sweep as sweep
 from .errors import (

@@ -4,7 +4,8 @@ from tadcore.statistics.radius import RadiusCurve
 from tadcore.statistics.sobol import Sensitivity, sobol
 
 from .maps import OutcomeMap, outcome_map
-from .placement import BestStart, ProbabilityMap, best_start, probability_map
+from .placement import BestStart, best_start
+from .probabilities import ProbabilityMap, probability_map
 from .radius import radius_curve
 from .sensitivities import sensitivity
 from .sweeps import SweepResult, sweep

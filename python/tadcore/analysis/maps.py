@@ -6,9 +6,7 @@ in blocks of rows, and beyond the map itself needs memory for one block only.
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
 from tadcore._shared.files import as_path, destination, write_whole
-from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
@@ -29,18 +25,12 @@ from tadcore.scenario.paths import label
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 
+from .grids import BLOCK, Grid
+
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-
-_BLOCK = 1 << 16
-"""Starts played at once: some megabytes of positions, and enough work for any number of threads."""
-
-_MOST_ON_AN_AXIS = 100_000
-_MOST = 200_000_000  # places: 13 bytes each
-_FINEST = 1e-12  # of the ends, between neighbours: closer ones are not told apart in a figure
-_SMALLEST = 1e-100
 
 _FIGURES = {".png", ".pdf", ".svg"}
 
@@ -156,21 +146,15 @@ def outcome_map(
 
     sc = as_scenario(sc)
     player = one_of("player", label(player), sc.players)
-    (columns, rows), up = grid_of(x, y), height(sc, player, z)
-    who = sc.players.index(player)
-    shape = (len(rows), len(columns))
-    kind, defender = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.int32)
-    time, diverged = np.empty(shape), np.empty(shape, dtype=np.bool_)
+    grid, who = Grid.of(sc, player, x, y, z), sc.players.index(player)
+    kind, defender = np.empty(grid.shape, dtype=np.int8), np.empty(grid.shape, dtype=np.int32)
+    time, diverged = np.empty(grid.shape), np.empty(grid.shape, dtype=np.bool_)
     flat: list[NDArray[Any]] = [array.reshape(-1) for array in (kind, defender, time, diverged)]
-    starts = range(0, kind.size, _BLOCK)
-    for start in bar(starts, f"map of {player}", show=progress):
-        block = slice(start, min(start + _BLOCK, kind.size))
-        places = np.arange(block.start, block.stop)
+    for start in bar(range(0, kind.size, BLOCK), f"map of {player}", show=progress):
+        block = slice(start, start + BLOCK)
+        places = grid.places(block)
         positions = np.repeat(sc.positions[np.newaxis], len(places), axis=0)
-        positions[:, who, 0] = columns[places % len(columns)]
-        positions[:, who, 1] = rows[places // len(columns)]
-        if up is not None:
-            positions[:, who, 2] = up
+        positions[:, who] = places
         batch = simulate_batch(sc, positions, threads=threads)
         for whole, part in zip(flat, (batch.kind, batch.defender, batch.time, batch.diverged), strict=True):
             whole[block] = part
@@ -185,16 +169,8 @@ def outcome_map(
                 "time": (("y", "x"), time, {"long_name": "instant of the end", "units": "1"}),
                 "diverged": (("y", "x"), diverged, {"long_name": "whether the game diverged, before its end or at it"}),
             },
-            coords={
-                "x": ("x", columns, {"long_name": f"initial x of {player}", "units": "1"}),
-                "y": ("y", rows, {"long_name": f"initial y of {player}", "units": "1"}),
-            },
-            attrs={
-                "title": f"Outcome by the start of {player}",
-                "player": player,
-                **({} if up is None else {"z": up}),
-                **provenance(sc),
-            },
+            coords=grid.coords(),
+            attrs={"title": f"Outcome by the start of {player}", **grid.attrs(), **provenance(sc)},
         ),
     )
 
@@ -205,38 +181,3 @@ def check_destination(field: str, path: Path) -> None:
         kinds = ", ".join(sorted(_FIGURES))
         raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
     destination(path)
-
-
-def height(sc: Scenario, player: str, z: float | None) -> float | None:
-    """In space, the height of the plane of a grid: the one given, or the player's own; None in the plane."""
-    if z is not None and (sc.dim == 2 or not math.isfinite(z)):
-        raise ScenarioError("z", z, "a finite height" if sc.dim == 3 else "left out: this game is in the plane")
-    if sc.dim == 2:
-        return None
-    return float(sc.positions[sc.players.index(player), 2] if z is None else z)
-
-
-def grid_of(x: Sequence[Any], y: Sequence[Any]) -> tuple[Floats, Floats]:
-    """The places of both axes of a grid, each from (low, high, count)."""
-    columns, rows = _axis("x", x), _axis("y", y)
-    if len(columns) * len(rows) > _MOST:
-        raise ScenarioError("x, y", f"{len(columns) * len(rows):,} places", f"a grid of at most {_MOST:,} places")
-    return columns, rows
-
-
-def _axis(field: str, given: Sequence[Any]) -> Floats:
-    """The places of one axis of a grid, from (low, high, count)."""
-    try:
-        low, high, count = given
-        ends = float(low), float(high)
-    except (TypeError, ValueError):
-        raise ScenarioError(field, given, "(low, high, count)") from None
-    number = as_index(f"{field}[2]", count, _MOST_ON_AN_AXIS, least=1)
-    for end in ends:
-        if not COORDINATE.holds(end):
-            raise ScenarioError(field, given, f"(low, high, count), each end {COORDINATE.words}")
-    if ends[0] > ends[1] or (ends[0] == ends[1]) != (number == 1):
-        raise ScenarioError(field, given, "(low, high, count) with low < high, or one place with low = high")
-    if number > 1 and not (ends[1] - ends[0]) / (number - 1) >= _FINEST * max(abs(ends[0]), abs(ends[1]), _SMALLEST):
-        raise ScenarioError(field, given, f"(low, high, count) with places at least {_FINEST:g} of the ends apart")
-    return np.linspace(*ends, number)

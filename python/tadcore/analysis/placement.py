@@ -1,21 +1,16 @@
-r"""Where to place a player: the probability of an outcome over its start, and the start at which it is largest.
+r"""Where to place a player: the start at which an outcome is most probable.
 
-Whatever else a study varies stays varied, and every start of the player is played with the same trials: common random
-numbers. So P, as estimated from M fixed trials, is a function of the start without noise, piecewise constant, which an
-optimiser can search; differences between starts are better known than the probabilities themselves.
-
-- **Pointwise** intervals are Clopper and Pearson's; **bands** hold at all places of the grid at once, for one outcome:
-  Clopper and Pearson's at 1 - (1 - level) / places (Bonferroni). Of a study that a rule was asked to stop, both are
-  confidence sequences instead.
-- The start that an optimiser returns was chosen for the trials that it was chosen with, so its share there is too
-  high. `best_start` therefore plays it again with fresh trials, and reports those.
+Every start is played with the same trials: common random numbers. So P, as estimated from M fixed trials, is a function
+of the start without noise, piecewise constant, which an optimiser can search. The start that it returns was chosen for
+the trials that it was chosen with, so its share there is too high: it is played again with fresh trials, and those are
+reported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,199 +18,14 @@ from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore._shared.shares import estimate
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
-from tadcore.statistics import TrialOutcomes, difference_interval, outcome_names, proportion_interval
-from tadcore.statistics.intervals import Method, band, ends
+from tadcore.statistics import difference_interval, outcome_names, proportion_interval
 from tadcore.statistics.outcomes import as_level
-from tadcore.statistics.stopping import level_of, stopping_of
 from tadcore.study.study import Study
 
-from .maps import grid_of, height
 from .replays import Placed
-
-if TYPE_CHECKING:
-    import xarray
-    from matplotlib.axes import Axes
-
-_BLOCK = 1 << 16
-"""Games played at once."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ProbabilityMap:
-    """Outcome probabilities over a grid of one player's start; made by `probability_map`.
-
-    Attributes
-    ----------
-    scenario : Scenario
-        The game, and where everyone is who does not vary.
-    player : str
-        Whose start runs over the grid.
-    trials : int
-        M, the same trials at every place.
-    level : float
-        Confidence level.
-    dataset : xarray.Dataset
-        ``count``, ``estimate``, ``low``, ``high`` (at each place by itself), ``band_low`` and ``band_high`` (at all
-        places at once, for one outcome), over (outcome, y, x). The last outcome is ``"diverged"`` where some trials
-        did; they are in no other.
-    """
-
-    scenario: Scenario
-    player: str
-    trials: int
-    level: float
-    dataset: xarray.Dataset
-
-    def best(self, outcome: str = "intercepted") -> dict[str, float]:
-        """The place of the grid where an outcome came most often, with its band.
-
-        The band holds at all places at once, so it holds at a place that was chosen for its share.
-
-        Parameters
-        ----------
-        outcome : str
-            ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` … ``"dn"``, or, where some did, ``"diverged"``.
-
-        Returns
-        -------
-        dict of str to float
-            ``x``, ``y``, ``estimate``, ``low`` and ``high``.
-
-        Raises
-        ------
-        ScenarioError
-            No such outcome.
-        """
-        if outcome not in self.dataset["outcome"].values:
-            raise ScenarioError("outcome", outcome, f"one of {', '.join(map(str, self.dataset['outcome'].values))}")
-        here = self.dataset.sel(outcome=outcome)
-        row, column = np.unravel_index(int(here["estimate"].values.argmax()), here["estimate"].shape)
-        place = here.isel(y=int(row), x=int(column))
-        found = {"x": place["x"], "y": place["y"], "estimate": place["estimate"]}
-        found |= {"low": place["band_low"], "high": place["band_high"]}
-        return {name: float(value) for name, value in found.items()}
-
-    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
-        """Draw the map; see `tadcore.plotting.probability_map`."""
-        from tadcore.plotting import probability_map as draw
-
-        return draw(self, ax, **options)
-
-    def __repr__(self) -> str:
-        _, rows, columns = self.dataset["estimate"].shape
-        best = self.best()
-        share, interval = estimate(best["estimate"], best["low"], best["high"])
-        rule = self.dataset.attrs.get("rule")
-        by = f"; {rule}" if rule else ""
-        return (
-            f"ProbabilityMap(start of {self.player} on {columns} × {rows} places, {self.trials:,} trials each: "
-            f"P(intercepted) up to {share} {interval} at ({best['x']:g}, {best['y']:g}){by})"
-        )
-
-
-@public
-def probability_map(
-    source: Study | TrialOutcomes,
-    player: str,
-    *,
-    x: tuple[float, float, int],
-    y: tuple[float, float, int],
-    z: float | None = None,
-    level: float | None = None,
-    threads: int | None = None,
-    progress: bool = False,
-) -> ProbabilityMap:
-    """Play the trials of a study from every place of a grid of one player's start.
-
-    Parameters
-    ----------
-    source : Study or StudyResult
-        What varies, and the trials; played or not. Where it varies the start of this player, the grid takes its place.
-    player : str
-        ``"d1"`` … ``"dn"``, ``"target"`` or ``"attacker"``.
-    x, y : (low, high, count)
-        The grid: ``count`` places from ``low`` to ``high``, both included.
-    z : float, optional
-        In space, the height of the plane of the grid; the player's own by default.
-    level : float, optional
-        Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop the study.
-    threads : int, optional
-        Worker threads; all cores by default.
-    progress : bool
-        Whether to show a progress bar, where standard error is a terminal.
-
-    Returns
-    -------
-    ProbabilityMap
-        Probabilities with intervals at every place.
-
-    Raises
-    ------
-    ScenarioError
-        No such player, or no such grid.
-    NoEquilibriumError
-        The game has no equilibrium on [0, T].
-
-    Examples
-    --------
-    >>> import tadcore
-    >>> from tadcore.sampling import Disk
-    >>> sc = tadcore.scenarios.load("paper-i1")
-    >>> study = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 1.0)}, trials=100, seed=7)
-    >>> found = tadcore.probability_map(study, "d3", x=(-1, 1, 3), y=(0, 2, 3))
-    >>> found.dataset.sizes["outcome"], found.trials
-    (6, 100)
-    """
-    import xarray as xr
-
-    from tadcore.scenario.provenance import provenance
-
-    stopping = stopping_of(source)
-    confidence = level_of(stopping, level)
-    games = Placed(source, player, threads)
-    sc, (columns, rows) = games.sc, grid_of(x, y)
-    up = height(sc, games.player, z)
-    places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    if up is not None:
-        places = np.column_stack([places, np.full(len(places), up)])
-    together = max(1, _BLOCK // games.trials)
-    count = np.empty((len(outcome_names(sc.n, diverged=True)), len(places)), dtype=np.int64)
-    for first in bar(range(0, len(places), together), f"probability map of {games.player}", show=progress):
-        block = slice(first, first + together)
-        count[:, block] = games.events(places[block]).sum(axis=2)
-    names = outcome_names(sc.n, diverged=bool(count[-1].any()))
-    count = count[: len(names)]
-    method: Method = "exact" if stopping is None else "sequence"
-    low, high = ends(count, games.trials, 1.0 - confidence, method)
-    band_low, band_high = band(count, games.trials, 1.0 - confidence, len(places), method)
-    shape = (len(names), len(rows), len(columns))
-    values = {"count": count, "estimate": count / games.trials, "low": low, "high": high}
-    values |= {"band_low": band_low, "band_high": band_high}
-    return ProbabilityMap(
-        scenario=sc,
-        player=games.player,
-        trials=games.trials,
-        level=confidence,
-        dataset=xr.Dataset(
-            {name: (("outcome", "y", "x"), array.reshape(shape)) for name, array in values.items()},
-            coords={
-                "outcome": list(names),
-                "x": ("x", columns, {"long_name": f"initial x of {games.player}", "units": "1"}),
-                "y": ("y", rows, {"long_name": f"initial y of {games.player}", "units": "1"}),
-            },
-            attrs={
-                "title": f"Outcome probabilities by the start of {games.player}",
-                "player": games.player,
-                "trials": games.trials,
-                "level": confidence,
-                **({} if stopping is None else {"rule": str(stopping)}),
-                **({} if up is None else {"z": up}),
-                **provenance(sc),
-            },
-        ),
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -347,7 +157,7 @@ def best_start(
         one.check(progress=progress)
     games = Placed(study, player, threads)
     names = outcome_names(games.sc.n, diverged=True)
-    which = names.index(as_outcome(outcome, games.sc.n))
+    which = names.index(one_of("outcome", outcome, names))
     bounds = _bounds(games.sc, x, y, z)
     steps = iter(bar(range(most), f"best start of {games.player}", show=progress))
     played = 0
@@ -383,14 +193,6 @@ def best_start(
         trials=fresh.trials,
         level=confidence,
     )
-
-
-def as_outcome(name: str, n: int) -> str:
-    """The name of an outcome of a game of n defenders."""
-    names = outcome_names(n, diverged=True)
-    if name not in names:
-        raise ScenarioError("outcome", name, f"one of {', '.join(names)}")
-    return name
 
 
 def _bounds(sc: Scenario, x: Any, y: Any, z: Any) -> list[tuple[float, float]]:

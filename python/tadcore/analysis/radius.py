@@ -21,8 +21,6 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -33,10 +31,9 @@ from tadcore.scenarios.given import ScenarioLike
 from tadcore.simulation.batch import Batch
 from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
-from tadcore.statistics.intervals import band, ends
+from tadcore.statistics.confidence import Confidence
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
-from tadcore.statistics.stopping import level_of, stopping_of
 from tadcore.study.study import Study
 
 from .breakpoints import breakpoints
@@ -99,8 +96,7 @@ def radius_curve(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
-    stopping = stopping_of(source)
-    confidence = level_of(stopping, level)
+    sure = Confidence.of(source, level)
     sc, rows = starts_of(source, positions)
     games = Replays(sc, rows, player, kind, threads)
     grid = games.checked("radii", radii)
@@ -128,12 +124,11 @@ def radius_curve(
         against_last.append(discordant(event, last))
         last = event
     count = np.array(counts).T
-    error, trials = 1.0 - confidence, len(rows)
-    low, high = ends(count, trials, error, "wilson" if stopping is None else "sequence")
-    band_low, band_high = band(count, trials, error, len(grid), "exact" if stopping is None else "sequence")
-    by: Literal["score", "sequence"] = "score" if stopping is None else "sequence"
-    difference = paired_differences(against_reference, trials, confidence, by)
-    slope = paired_differences(against_last, trials, confidence, by)[..., 1:] / np.diff(grid)
+    trials = len(rows)
+    low, high = sure.ends(count, trials, "wilson")
+    band_low, band_high = sure.band(count, trials, len(grid))
+    difference = paired_differences(against_reference, trials, sure.level, sure.paired)
+    slope = paired_differences(against_last, trials, sure.level, sure.paired)[..., 1:] / np.diff(grid)
     return RadiusCurve(
         player=games.player,
         radius=kind,
@@ -154,7 +149,7 @@ def radius_curve(
         kind=np.array([batch.kind for batch in played]),
         defender=np.array([batch.defender for batch in played]),
         diverged=np.array([batch.diverged for batch in played]),
-        level=confidence,
+        level=sure.level,
         breakpoints=breakpoints(games, grid, played, tolerance) if refine else None,
-        rule="" if stopping is None else str(stopping),
+        rule=sure.rule,
     )

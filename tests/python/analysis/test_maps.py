@@ -41,7 +41,7 @@ def test_every_place_is_a_game(sc, player, field):
 
 def test_blocks_change_nothing(sc, monkeypatch):
     whole = outcome_map(sc, x=(-3, 3, 11), y=(-2, 2, 7), threads=1)
-    monkeypatch.setattr(maps, "_BLOCK", 10)
+    monkeypatch.setattr(maps, "BLOCK", 10)
     parts = outcome_map(sc, x=(-3, 3, 11), y=(-2, 2, 7), threads=2)
     assert whole.dataset.identical(parts.dataset)
 

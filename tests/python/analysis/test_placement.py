@@ -7,7 +7,7 @@ from scipy.stats import beta, norm
 
 import tadcore
 from tadcore import ScenarioError, best_start, probability_map
-from tadcore.analysis import placement
+from tadcore.analysis import placement, probabilities
 from tadcore.sampling import Box, Disk
 
 
@@ -58,7 +58,7 @@ def test_intervals_are_exact_and_bands_hold_at_all_places(found):
 
 
 def test_blocks_change_nothing(study, found, monkeypatch):
-    monkeypatch.setattr(placement, "_BLOCK", 1)
+    monkeypatch.setattr(probabilities, "BLOCK", 1)
     assert probability_map(study, "d3", x=(-2, 1, 4), y=(-1, 2, 3), threads=1).dataset.identical(found.dataset)
 
 

@@ -14,7 +14,7 @@ from tadcore._shared.calls import public
 from tadcore._shared.shares import estimate, percent
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
-from tadcore.plotting.tools.outcomes import boxes, input_label, outcome_look, parts_of, quantity_label, stack
+from tadcore.plotting.tools.outcomes import boxes, input_label, listed, outcome_look, parts_of, quantity_label, stack
 from tadcore.plotting.tools.style import COLUMN, symbol
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve
 from tadcore.statistics.sobol import Sensitivity
@@ -184,8 +184,7 @@ def radius_curve(
     kinds = {"probability": "estimate", "difference": "difference", "slope": "slope"}
     if outcomes is None:
         outcomes = ["intercepted", "captured", "timeout", *(name for name in curve.names if name == "diverged")]
-    if quantity not in kinds:
-        raise ValueError(f"no quantity {quantity!r}; one of {', '.join(kinds)}")
+    listed("quantity", quantity, tuple(kinds))
     finite = np.isfinite(curve.radii)
     if finite.sum() < (2 if quantity == "slope" else 1):
         raise ValueError("no finite radius to draw" if quantity != "slope" else "a slope needs two finite radii")
@@ -196,8 +195,7 @@ def radius_curve(
     low_name, high_name = ("low", "high") if part == "estimate" else (f"{part}_low", f"{part}_high")
     ends = []
     for name in outcomes:
-        if name not in curve.names:
-            raise ValueError(f"no outcome {name!r}; one of {', '.join(curve.names)}")
+        listed("outcome", name, curve.names)
         it, i = outcome_look(name), curve.names.index(name)
         line, low, high = (getattr(curve, key)[i][: len(at)] for key in (part, low_name, high_name))
         if quantity == "probability":
@@ -250,8 +248,7 @@ def sensitivity(found: Sensitivity, output: str | None = None, ax: Axes | None =
         No such quantity, or one that never varied.
     """
     name = found.outputs[0] if output is None else output
-    if name not in found.outputs:
-        raise ValueError(f"no output {name!r}; one of {', '.join(found.outputs)}")
+    listed("output", name, found.outputs)
     o = found.outputs.index(name)
     if np.isnan(found.total[o]).any():
         raise ValueError(f"{name!r} never varied, so no input explains it")

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
-from tadcore.plotting.tools.axes import new_axes
-from tadcore.plotting.tools.outcomes import input_label, outcome_look
+from tadcore.plotting.tools.axes import colour_bar, new_axes
+from tadcore.plotting.tools.outcomes import input_label, listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.outcomes import diverged_of, indicators
@@ -66,8 +66,7 @@ def outcomes_over(
     """
     lost = diverged_of(result)
     names = outcome_names(result.scenario.n, diverged=lost is not None)
-    if outcome not in names:
-        raise ValueError(f"no outcome {outcome!r}; one of {', '.join(names)}")
+    listed("outcome", outcome, names)
     for name in (x, y):
         if name not in result.inputs:
             raise ValueError(f"no input {name!r}; the study varies {', '.join(result.inputs)}")
@@ -84,8 +83,7 @@ def outcomes_over(
     ax.set_facecolor("0.93")
     image = ax.pcolormesh(edges_x, edges_y, share.T, cmap="cividis", vmin=0.0, vmax=1.0, rasterized=True)
     if legend:
-        bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))
-        bar.figure.colorbar(image, cax=bar, label=f"share of trials: {outcome_look(outcome).label}")
+        colour_bar(ax, image, f"share of trials: {outcome_look(outcome).label}")
     ax.set(xlabel=input_label(x), ylabel=input_label(y))
     if x.endswith(".x") and y == f"{x[:-1]}y":  # one player's plane
         ax.set_aspect("equal")

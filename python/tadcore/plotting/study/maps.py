@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 from matplotlib.patches import Circle
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
-from tadcore.plotting.tools.axes import above, new_axes
+from tadcore.plotting.tools.axes import above, colour_bar, new_axes
 from tadcore.plotting.tools.labels import Labels
-from tadcore.plotting.tools.outcomes import boxes, outcome_look
+from tadcore.plotting.tools.outcomes import boxes, listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN, PAGE, look, symbol
 from tadcore.scenario.model import Scenario
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.image import AxesImage
     from numpy.typing import NDArray
 
+
+Extent: TypeAlias = tuple[float, float, float, float]
+"""Left, right, bottom and top, as Matplotlib's imshow takes them."""
 
 _HATCHED = 240  # grid points along an axis from which hatches are cut; finer ones would print as noise
 _KINDS = ("timeout", "captured")
@@ -78,14 +81,8 @@ def outcome_map(
     ValueError
         No such quantity.
     """
-    if quantity not in ("outcome", "time"):
-        raise ValueError(f"no quantity {quantity!r}; one of outcome, time")
-    x, y = (np.asarray(found.dataset[axis].values, dtype=float) for axis in "xy")
-    left, right, bottom, top = extent = (*edges(x, y), *edges(y, x))
-    ratio = (top - bottom) / (right - left)
-    width = PAGE if ratio < 1.0 / 3.0 else COLUMN
-    beside = 0.6 if quantity == "time" and legend else 0.0  # inches that the colour bar takes
-    ax = new_axes(ax, width, float(np.clip((width - 0.6 - beside) * ratio + (0.5 if beside else 0.8), 1.6, 5.5)))
+    listed("quantity", quantity, ("outcome", "time"))
+    ax, x, y, extent = frame(found, ax, bar=quantity == "time" and legend)
     if quantity == "outcome":
         names = _areas(ax, found, x, y, extent)
         if legend:
@@ -93,23 +90,36 @@ def outcome_map(
     else:
         image = _times(ax, found, x, y, extent, legend=legend)
         if legend:
-            bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))  # as tall as the map, whatever its aspect
-            bar.figure.colorbar(image, cax=bar, label="termination time")
+            colour_bar(ax, image, "termination time")
     draw_players(ax, found, extent, radii=radii, dark=quantity == "time")
-    who = symbol(found.player)
-    ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
-    ax.set_aspect("equal")
     return ax
 
 
-def edges(points: Floats, others: Floats) -> tuple[float, float]:
+def frame(
+    found: OverStarts, ax: Axes | None, *, bar: bool
+) -> tuple[Axes, Floats, Floats, tuple[float, float, float, float]]:
+    """The axes of a map, with room beside them where there will be a bar of colours; its places and where it ends."""
+    x, y = (np.asarray(found.dataset[axis].values, dtype=float) for axis in "xy")
+    left, right, bottom, top = extent = (*_edges(x, y), *_edges(y, x))
+    ratio = (top - bottom) / (right - left)
+    width = PAGE if ratio < 1.0 / 3.0 else COLUMN
+    beside = 0.65 if bar else 0.0  # inches
+    ax = new_axes(ax, width, float(np.clip((width - 0.6 - beside) * ratio + (0.5 if bar else 0.8), 1.6, 5.5)))
+    who = symbol(found.player)
+    ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
+    ax.set_autoscale_on(False)
+    ax.set_aspect("equal")
+    return ax, x, y, extent
+
+
+def _edges(points: Floats, others: Floats) -> tuple[float, float]:
     """Where the first and the last cell of an axis end; a single place is as wide as the other axis's cells."""
     spread = points if len(points) > 1 else others
     half = float(spread[1] - spread[0]) / 2.0 if len(spread) > 1 else 0.5
     return float(points[0]) - half, float(points[-1]) + half
 
 
-def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[float, ...]) -> list[str]:
+def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: Extent) -> list[str]:
     """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
     names = [*_KINDS, *found.scenario.players[: found.scenario.n], "diverged"]
@@ -118,28 +128,24 @@ def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[floa
         code = np.where(found.dataset["diverged"].values, len(names) - 1, code)
     looks = [outcome_look(name) for name in names]
     colours = np.array([look.fill for look in looks])
-    left, right, bottom, top = extent
-    ax.imshow(colours[code], origin="lower", extent=(left, right, bottom, top), interpolation="nearest", zorder=1.0)
+    ax.imshow(colours[code], origin="lower", extent=extent, interpolation="nearest", zorder=1.0)
     there = [i for i in range(len(names)) if np.any(code == i)]
     for i in there:
         _hatch(ax, x, y, code == i, looks[i].hatch)
     return [names[i] for i in there]
 
 
-def _times(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: tuple[float, ...], *, legend: bool) -> AxesImage:
+def _times(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: Extent, *, legend: bool) -> AxesImage:
     """Colour by the time of the end, and draw what diverges as in a map of outcomes."""
-    left, right, bottom, top = extent
     lost = np.asarray(found.dataset["diverged"].values)
     time = np.where(lost, np.nan, found.dataset["time"].values)
     if lost.any():
         it = outcome_look("diverged")
-        ax.imshow(
-            np.where(lost[..., None], it.fill, 1.0), origin="lower", extent=(left, right, bottom, top), zorder=0.9
-        )
+        ax.imshow(np.where(lost[..., None], it.fill, 1.0), origin="lower", extent=extent, zorder=0.9)
         _hatch(ax, x, y, lost, it.hatch)
         if legend:
             above(ax, boxes(["diverged"]))
-    return ax.imshow(time, origin="lower", extent=(left, right, bottom, top), cmap="cividis", zorder=1.0)
+    return ax.imshow(time, origin="lower", extent=extent, cmap="cividis", zorder=1.0)
 
 
 def _hatch(ax: Axes, x: Floats, y: Floats, where: NDArray[np.bool_], hatch: str) -> None:
@@ -155,7 +161,7 @@ def _hatch(ax: Axes, x: Floats, y: Floats, where: NDArray[np.bool_], hatch: str)
         area.set_linewidth(0.0)
 
 
-def draw_players(ax: Axes, found: OverStarts, extent: tuple[float, ...], *, radii: bool, dark: bool) -> None:
+def draw_players(ax: Axes, found: OverStarts, extent: Extent, *, radii: bool, dark: bool) -> None:
     """The players where they start, with their radii; a hollow marker for the one whose start varies."""
     sc, left, right, bottom, top = found.scenario, *extent
     labels = Labels(ax)

@@ -102,6 +102,12 @@ def new_panels(
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **options), dtype=object)
 
 
+def colour_bar(ax: Axes, image: Any, label: str) -> None:
+    """The colours of an image, beside its axes and as tall as they are, whatever their aspect."""
+    bar = ax.inset_axes((1.03, 0.0, 0.045, 1.0))
+    bar.figure.colorbar(image, cax=bar, label=label)
+
+
 def above(ax: Axes, handles: Sequence[Any], *, columns: int | None = None, **options: Any) -> Legend:
     """A legend above the axes, where it covers nothing: in one row, or in as many as its share of the width needs."""
     settings: dict[str, Any] = {

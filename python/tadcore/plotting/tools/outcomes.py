@@ -56,6 +56,13 @@ def outcome_look(name: str) -> OutcomeLook:
     return OutcomeLook(f"by {who.symbol}", who.colour, fill, _HATCHES[i % len(_HATCHES)], who.marker, who.dashes)
 
 
+def listed(what: str, given: object, known: Sequence[str]) -> str:
+    """What was given, if it is one of those that are known; raises ValueError."""
+    if not isinstance(given, str) or given not in known:
+        raise ValueError(f"no {what} {given!r}; one of {', '.join(known)}")
+    return given
+
+
 def parts_of(names: Sequence[str]) -> list[str]:
     """The outcomes that exclude one another and are certain together: "intercepted" by its defenders."""
     lost = [name for name in names if name == "diverged"]
