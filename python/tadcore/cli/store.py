@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from .options import FAILED
 from .terminal import say
 
 store = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -37,3 +38,21 @@ def verify_store(
 
     found = verified(folder, progress=progress)
     say(f"{found:,} trials, all as they were written")
+
+
+@store.command(name="merge", short_help="Make one store of the parts of a study.")
+def merge(folder: Folder) -> None:
+    """Make one store of what the jobs of ``tadcore study --part I/N`` have left in DIR.
+
+    \b
+      tadcore store merge out
+
+    Trials that no finished part has are left out: ``tadcore study`` with the same store plays these. The exit code is 1
+    where there are such.
+    """
+    from tadcore.study.merging import merge_store
+
+    found = merge_store(folder)
+    say(f"{found.parts} part{'' if found.parts == 1 else 's'} merged: {found.trials:,} of {found.wanted:,} trials")
+    if found.trials < found.wanted:
+        raise typer.Exit(FAILED)

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from tadcore._shared.shares import percent
 from tadcore._shared.toml import STDIN, read_stdin
+from tadcore.errors import ScenarioError
 
 from .terminal import complain, say
 
@@ -37,6 +38,10 @@ def study(
         Keeping | None,
         typer.Option(help="What is kept of every trial; by default what the study file says, or all."),
     ] = None,
+    part: Annotated[
+        str | None,
+        typer.Option(metavar="I/N", help="Play part I, from 1, of N into DIR, to be merged with the others."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
 ) -> None:
@@ -47,6 +52,7 @@ def study(
       tadcore study my-study.toml --store out --threads 4 --no-progress
       tadcore study my-study.toml --store out --table paper-i1.table
       tadcore study my-study.toml --store out --keep counts
+      tadcore study my-study.toml --store out --part 3/100
 
     Run again, it resumes from what DIR holds. A study file:
 
@@ -63,21 +69,26 @@ def study(
     """
     from tadcore.statistics.outcomes import excluding
     from tadcore.study.manifest import Manifest
+    from tadcore.study.part import as_part, folder_of
     from tadcore.study.study import Study
 
     if str(file) == STDIN:
         wanted = Study.from_toml_string(read_stdin(), name="standard input")
     else:
         wanted = Study.from_toml(file)
+    which = None if part is None else as_part(_numbers(part))
     if resume:
-        Manifest.read(store)
+        Manifest.read(folder_of(which, store))
+    options: dict[str, Any] = {"progress": progress, "store": store, "threads": threads, "table": table}
+    options |= {"keep": None if keep is None else keep.value, "part": which}
     try:
-        result = wanted.run(
-            progress=progress, store=store, threads=threads, table=table, keep=None if keep is None else keep.value
-        )
+        result = wanted.run(**options)
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None
+    if which is not None:
+        say(f"{result!r}\nwritten to {store}; tadcore store merge {store} makes one store of all parts")
+        return
     found = result.probabilities()
     say(f"{result.trials:,} trials")
     for i in excluding(found.names):
@@ -85,3 +96,11 @@ def study(
         say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
     say(f"intervals: {percent(found.level)} ({found.method})", indent=2)
     say(f"written to {store}")
+
+
+def _numbers(text: str) -> tuple[int, int]:
+    """I/N as two numbers."""
+    i, slash, n = text.partition("/")
+    if not (slash and i.isdecimal() and n.isdecimal()):
+        raise ScenarioError("--part", text, "I/N, such as 3/100: part 3, from 1, of 100")
+    return int(i), int(n)

@@ -20,7 +20,6 @@ from tadcore.statistics.tally import Tally
 from .keepers import Keeper
 from .plan import Plan
 from .progress import Progress
-from .rows import Rows
 from .workers import LostWorkerError, Wanted, played_by
 
 
@@ -72,8 +71,18 @@ class Collection:
         """The rule that is asked, and whether it has held."""
         return None if self._until is None else stopping_by(self._until, held=self._stopped is not None, chunk=CHUNK)
 
-    def gather(self, executor: Executor | None, threads: int | None, table: Path | None) -> Rows:
-        """Take what is stored, play what is not, and return all of it."""
+    @property
+    def tally(self) -> Tally:
+        """The counts of all that was collected, up to where the rule held."""
+        return self._total if self._until is not None else self._sum()
+
+    @property
+    def trials(self) -> int:
+        """The trials up to there."""
+        return self._trials if self._stopped is None else self._stopped
+
+    def gather(self, executor: Executor | None, threads: int | None, table: Path | None) -> None:
+        """Take what is stored, and play what is not."""
         stopping = self.stopping
         left = self._keeper.begin(self._chunks, None if stopping is None else kept(stopping))
         for chunk, chunks, tally in self._keeper.stored(apart=self._until is not None):
@@ -87,14 +96,12 @@ class Collection:
                 place = self._keeper.place
                 raise WorkerError(str(error), self._done, len(self._chunks), place) from error.__cause__
         self._tell()
-        trials = min(self._trials, self._chunks.stop * CHUNK) if self._stopped is None else self._stopped
-        return self._keeper.rows(trials, self._total if self._until is not None else self._sum())
 
     def _play(self, left: list[int], executor: Executor | None, threads: int | None, table: Path | None) -> None:
         wanted = Wanted(left, self._trials, self._keeper.keep, self._until is not None)
         with contextlib.closing(played_by(self._plan, wanted, executor, threads, table)) as results:
             for played in results:
-                self._add(played.task.first, len(played.task.chunks()), played.tallies)
+                self._add(played.task.first, played.task.many, played.tallies)
                 if self._stopped is None or self._keeper.keep != "counts":
                     self._keeper.add(played)
                 if self._stopped is not None:

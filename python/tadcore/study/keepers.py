@@ -24,6 +24,7 @@ from .table import schema_of, table_of, tally_of
 from .writing import Writer
 
 _PATIENCE = 1.0  # seconds between two files of counts
+_TOGETHER = 256  # tallies that are added up at once
 
 
 class Keeper(Protocol):
@@ -57,11 +58,11 @@ class Keeper(Protocol):
 class RowKeeper:
     """Keeps a row for every trial: in memory, in a store, or both."""
 
-    def __init__(self, plan: Plan, trials: int, keep: Keep, store: Store | None) -> None:
+    def __init__(self, plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool) -> None:
         self.keep = keep
         self._plan, self._trials, self._store = plan, trials, store
         self._schema = schema_of(plan, keep)
-        self._held: dict[int, pa.Table] | None = {} if store is None or trials <= EAGER else None
+        self._held: dict[int, pa.Table] | None = {} if store is None or (hold and trials <= EAGER) else None
         self._there: list[int] = []
         self._writer: Writer | None = None
 
@@ -135,6 +136,7 @@ class CountKeeper:
         self._empty = Tally.empty(plan.scenario.n, plan.scenario.steps)
         self._first = self._next = 0
         self._tally = self._empty
+        self._added: list[Tally] = []
         self._waiting: dict[int, Played] = {}
         self._written = time.monotonic()
         self._end = 0
@@ -182,15 +184,16 @@ class CountKeeper:
         self._waiting[played.task.first] = played
         while self._next in self._waiting:
             ready = self._waiting.pop(self._next)
-            self._tally = Tally.sum([self._tally, *ready.tallies], self._tally.n, self._tally.steps)
-            self._next += len(ready.task.chunks())
+            self._added += ready.tallies
+            self._next += ready.task.many
             self._end += ready.task.trials
-        if time.monotonic() - self._written > _PATIENCE:
+        if len(self._added) > _TOGETHER or time.monotonic() - self._written > _PATIENCE:
             self.close()
 
     def close(self) -> None:
         """Write the counts so far, and remove those of fewer trials."""
         self._written = time.monotonic()
+        self._tally, self._added = Tally.sum([self._tally, *self._added], self._tally.n, self._tally.steps), []
         if self._store is None or self._end <= self._first:
             return
         counted = Counted(self._first, self._end, self._tally)
@@ -210,14 +213,14 @@ class CountKeeper:
     def rows(self, trials: int, tally: Tally) -> Rows:
         """Counts alone."""
         if trials != self._end - self._first:  # where a rule stopped the study
-            self._tally, self._end = tally, self._first + trials
+            self._tally, self._added, self._end = tally, [], self._first + trials
             self.close()
         return Counts(tally)
 
 
-def keeper_of(plan: Plan, trials: int, keep: Keep, store: Store | None) -> Keeper:
-    """What keeps that much of every trial."""
-    return CountKeeper(plan, trials, store) if keep == "counts" else RowKeeper(plan, trials, keep, store)
+def keeper_of(plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool) -> Keeper:
+    """What keeps that much of every trial; with ``hold`` the rows in memory, too, where they are not too many."""
+    return CountKeeper(plan, trials, store) if keep == "counts" else RowKeeper(plan, trials, keep, store, hold=hold)
 
 
 def rows_there(store: Store, wanted: int) -> Rows:

@@ -57,6 +57,11 @@ class Task(NamedTuple):
     apart: bool
     """Whether the chunks are counted one by one, for a rule that is asked after each."""
 
+    @property
+    def many(self) -> int:
+        """How many chunks."""
+        return -(-self.trials // CHUNK)
+
     def chunks(self) -> list[tuple[int, int]]:
         """Every chunk with the number of its trials."""
         return [(self.first + i, rows) for i, rows in enumerate(rows_of_chunks(self.trials))]
@@ -142,7 +147,9 @@ class Plan:
             path = f"defenders.{i}.visibility_radius" if i < self.scenario.n else f"{where}.visibility_radius"
             self._refuse(chunk, path, np.broadcast_to(seen, bad.shape), bad, too_far(float(extents[int(bad.argmax())])))
 
-    def check_ahead(self, trials: int, *, threads: int | None = None, progress: bool = False) -> None:
+    def check_ahead(
+        self, trials: int, only: range | None = None, *, threads: int | None = None, progress: bool = False
+    ) -> None:
         """Check before anything runs that every trial is a game: a millisecond a chunk, few of them in memory.
 
         Where the supports of the samplers prove it, the first chunk is enough.
@@ -151,7 +158,8 @@ class Plan:
         def checked(chunk: int) -> None:
             self.check(chunk, self.draw(chunk, min(CHUNK, trials - chunk * CHUNK)))
 
-        chunks = range(1 if self.proven else math.ceil(trials / CHUNK))
+        wanted = range(math.ceil(trials / CHUNK)) if only is None else only
+        chunks = wanted[:1] if self.proven else wanted
         for _ in bar(in_order(checked, chunks, threads), "checking draws", total=len(chunks), show=progress):
             pass
 

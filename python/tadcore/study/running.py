@@ -17,6 +17,7 @@ from .collect import Collection, StoppingRule
 from .definition import Definition
 from .keepers import keeper_of
 from .keeping import Keep, as_keep
+from .part import StudyPart, as_part, chunks_of, folder_of
 from .progress import Progress
 from .rows import Rows
 from .store import Store
@@ -33,9 +34,10 @@ class Options(NamedTuple):
     until: StoppingRule | None
     table: str | os.PathLike[str] | None
     keep: Keep | None
+    part: tuple[int, int] | None
 
 
-def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None]:
+def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None] | StudyPart:
     """Play what the store does not have; raises what `tadcore.Study.run` says."""
     executor, until, progress = options.executor, options.until, options.progress
     threads = None if options.threads is None else as_index("threads", options.threads, 2**16, least=1)
@@ -50,15 +52,25 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
     folder = None if options.store is None else as_path("store", options.store)
     table = None if options.table is None else as_path("table", options.table)
     keep = study.keep if options.keep is None else as_keep(options.keep)
+    part = None if options.part is None else as_part(options.part)
+    if part is not None and folder is None:
+        raise ScenarioError("part", part, "given with store=…, where the other parts are, too")
+    if part is not None and until is not None:
+        raise ScenarioError("until", until, "left out: a rule sees all trials in their order, a part has only its own")
+    chunks = chunks_of(part, study.trials)
     plan = study.plan
-    plan.check_ahead(study.trials, threads=threads, progress=bool(progress))
+    plan.check_ahead(study.trials, chunks, threads=threads, progress=bool(progress))
     plan.game.equilibrium()
     with contextlib.ExitStack() as running:
         running.enter_context(warm(study.scenario, table))
         store = None
         if folder is not None:
-            store = running.enter_context(Store.writing(folder, study.manifest(keep), plan))
-        bar = running.enter_context(Progress(study.trials, wanted=progress))
-        keeper = keeper_of(plan, study.trials, keep, store)
-        collection = Collection(plan, study.trials, range(-(-study.trials // CHUNK)), keeper, bar, until)
-        return collection.gather(executor, threads, table), collection.stopping
+            store = running.enter_context(Store.writing(folder_of(part, folder), study.manifest(keep), plan))
+        trials = max(0, min(study.trials, chunks.stop * CHUNK) - chunks.start * CHUNK)
+        bar = running.enter_context(Progress(trials, wanted=progress))
+        keeper = keeper_of(plan, study.trials, keep, store, hold=part is None)
+        collection = Collection(plan, study.trials, chunks, keeper, bar, until)
+        collection.gather(executor, threads, table)
+        if part is not None:
+            return StudyPart(part, chunks.start * CHUNK, trials, collection.tally)
+        return keeper.rows(collection.trials, collection.tally), collection.stopping

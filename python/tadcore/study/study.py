@@ -24,7 +24,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import Executor
 from functools import cached_property
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from tadcore.statistics.stopping import Stopping
 from .collect import StoppingRule
 from .definition import Definition
 from .keeping import Keep
+from .part import StudyPart
 from .reading import opened, rows_and_rule
 from .rows import MOST_BYTES, Rows
 from .running import Options, gathered
@@ -124,6 +125,31 @@ class Study(Definition):
 
         return cls(**parse_study(text, name, as_path("folder", folder)))
 
+    @overload
+    def run(
+        self,
+        *,
+        progress: bool | str = False,
+        store: str | os.PathLike[str] | None = None,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        until: StoppingRule | None = None,
+        table: str | os.PathLike[str] | None = None,
+        keep: Keep | None = None,
+        part: None = None,
+    ) -> StudyResult: ...
+    @overload
+    def run(
+        self,
+        *,
+        progress: bool | str = False,
+        store: str | os.PathLike[str],
+        threads: int | None = None,
+        executor: Executor | None = None,
+        table: str | os.PathLike[str] | None = None,
+        keep: Keep | None = None,
+        part: tuple[int, int],
+    ) -> StudyPart: ...
     @public
     def run(
         self,
@@ -135,7 +161,8 @@ class Study(Definition):
         until: StoppingRule | None = None,
         table: str | os.PathLike[str] | None = None,
         keep: Keep | None = None,
-    ) -> StudyResult:
+        part: tuple[int, int] | None = None,
+    ) -> StudyResult | StudyPart:
         """Play the trials.
 
         Parameters
@@ -161,10 +188,13 @@ class Study(Definition):
             What is kept of every trial: its outcome and what was drawn; its outcome, what was drawn being drawn again
             when it is asked for; or nothing, only how many ended in each way at each step, from which probabilities,
             incidence and stopping rules follow as exactly. By default the study's own `keep`.
+        part : tuple of int, optional
+            (i, n): play part i, from 1, of n, each as many trials, into a folder of its own in ``store``. So n jobs, on
+            any machines that share the folder, play a study; `tadcore.study.merge_store` makes one store of them.
 
         Returns
         -------
-        StudyResult
+        StudyResult, or StudyPart where a part was asked for
             Bitwise reproducible for any number of threads, any executor and any interruptions.
 
         Raises
@@ -181,8 +211,8 @@ class Study(Definition):
         KeyboardInterrupt
             Ctrl-C; what was finished is in the store.
         """
-        options = Options(progress, store, threads, executor, until, table, keep)
-        return StudyResult(self, *gathered(self, options))
+        found = gathered(self, Options(progress, store, threads, executor, until, table, keep, part))
+        return found if isinstance(found, StudyPart) else StudyResult(self, *found)
 
 
 class StudyResult(Trials):

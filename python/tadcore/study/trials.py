@@ -12,15 +12,14 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore.game.outcome import DIVERGED
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath
 from tadcore.simulation.termination import Termination
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, TrialOutcomes
-from tadcore.statistics.outcomes import KINDS
 from tadcore.statistics.stopping import Stopping
 from tadcore.statistics.tally import Tally
 
+from .part import named
 from .rows import Rows
 from .table import FIXED, PASSED
 
@@ -105,9 +104,7 @@ class Trials:
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""
-        *kinds, lost = (int(count) for count in self.tally.kinds())
-        counts = dict(zip(KINDS, kinds, strict=True))
-        return counts | {DIVERGED: lost} if lost else counts
+        return named(self.tally)
 
     def probabilities(
         self, *, level: float | None = None, method: Literal["wilson", "exact", "sequence"] | None = None

@@ -1,0 +1,117 @@
+"""The parts of a study, each run by a job of its own, as one store."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from tadcore._shared.files import as_path
+from tadcore.errors import StoreError
+
+from .counted import Counted, content_of, ranges_in, read_counts
+from .keepers import rows_there
+from .lock import LOCK, alone
+from .manifest import MANIFEST, Manifest, faults
+from .reading import opened
+from .store import Store, write
+from .writing import Writer
+
+_PART = re.compile(r"_part-(\d{5})-of-(\d{5})")
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What a merged store holds.
+
+    Attributes
+    ----------
+    parts : int
+        How many parts were merged just now.
+    trials : int
+        The trials before the first that is missing.
+    wanted : int
+        The trials of the study.
+    """
+
+    parts: int
+    trials: int
+    wanted: int
+
+
+def merge_store(folder: str | os.PathLike[str]) -> Merged:
+    """Make one store of the parts that jobs with ``part=(i, n)`` have left in a folder.
+
+    Parts that are not there, or not finished, leave trials out; `tadcore.Study.run` with the same store plays these,
+    and parts that come later can be merged later. Rows are moved, not copied.
+
+    Parameters
+    ----------
+    folder : path
+        The store that all parts were given.
+
+    Returns
+    -------
+    Merged
+        How many trials are there.
+
+    Raises
+    ------
+    StoreError
+        There are no parts, one is of another study or still being written, or a file is damaged.
+    """
+    place = as_path("folder", folder)
+    found = sorted(path for path in place.glob("_part-*") if path.is_dir() and _PART.fullmatch(path.name))
+    if not found:
+        raise StoreError(str(place), "it holds no parts of a study", "run them with part=(i, n) and this store")
+    manifests = [Manifest.read(path) for path in found]
+    first = manifests[0]
+    for manifest, path in zip(manifests, found, strict=True):
+        manifest.same(first, path)
+        if manifest.trials != first.trials:
+            asked = f"it is of a study of {manifest.trials:,} trials, and {found[0].name} of one of {first.trials:,}"
+            raise StoreError(str(path), asked, "run all parts with as many trials")
+    plan = opened(found[0])[0].plan
+    with contextlib.ExitStack() as until_the_end:
+        store = until_the_end.enter_context(Store.writing(place, first, plan))
+        for path in found:
+            until_the_end.enter_context(alone(path))
+        for path in found:
+            for one in sorted(path.glob("[!_.]*.parquet")):
+                with faults(one):
+                    one.replace(place / one.name)
+    for path in found:
+        with faults(path):
+            for left in (MANIFEST, LOCK):
+                (path / left).unlink(missing_ok=True)
+            path.rmdir()
+    with Store.writing(place, first, plan) as store:
+        if store.keep == "counts":
+            _add_up(store)
+        else:
+            Writer(store, ()).close()
+        return Merged(len(found), rows_there(store, first.trials).trials, first.trials)
+
+
+def _add_up(store: Store) -> None:
+    """One file of counts for the files that follow one another."""
+    files = ranges_in(store.folder)
+    counted: Counted | None = None
+    merged: list[Path] = []
+    for first, end, path in files:
+        if counted is not None and end <= counted.end:
+            merged.append(path)  # among those that are counted already
+        elif first == (0 if counted is None else counted.end):
+            more = read_counts(path, first, end, store.plan, store.manifest.study)
+            counted = more if counted is None else Counted(0, end, counted.tally + more.tally)
+            merged.append(path)
+    if counted is None or len(merged) == 1:
+        return
+    whole = store.folder / counted.name
+    write(whole, content_of(counted, store.plan, store.manifest.study))
+    for path in merged:
+        if path != whole:
+            with faults(path):
+                path.unlink()
