@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tadcore._shared.calls import public
 from tadcore._shared.files import as_path, destination, write_whole
+from tadcore._shared.html import block
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
@@ -86,6 +87,11 @@ class OutcomeMap:
         with for_files(), plotting.style():
             plotting.save(root_figure(self.plot(**options)), target.with_suffix(""), formats=[target.suffix[1:]])
         return target
+
+    def _repr_html_(self) -> str:
+        from tadcore.plotting.tools.inline import inline
+
+        return block(repr(self), inline(self.plot, repr(self)))
 
     def __repr__(self) -> str:
         rows, columns = self.dataset["kind"].shape

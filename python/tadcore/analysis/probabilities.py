@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tadcore._shared.calls import public
+from tadcore._shared.html import block
 from tadcore._shared.progress import bar
 from tadcore._shared.shares import estimate
 from tadcore.errors import ScenarioError
@@ -94,6 +95,11 @@ class ProbabilityMap:
         from tadcore.plotting import probability_map as draw
 
         return draw(self, ax, **options)
+
+    def _repr_html_(self) -> str:
+        from tadcore.plotting.tools.inline import inline
+
+        return block(repr(self), inline(self.plot, repr(self)))
 
     def __repr__(self) -> str:
         _, rows, columns = self.dataset["estimate"].shape

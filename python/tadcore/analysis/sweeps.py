@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tadcore._shared.calls import public
+from tadcore._shared.html import as_html, line, thinned
+from tadcore._shared.shares import estimate, percent
 from tadcore.errors import NoEquilibriumError, ScenarioError
 from tadcore.game.outcome import DIVERGED, OutcomeKind
 from tadcore.scenario.paths import expand, normal, short
@@ -132,6 +134,20 @@ class SweepResult:
             if short(path) != path:  # the same values under the name that people write
                 made = made.assign_coords({short(path): (path, made[path].values)}).set_xindex(short(path))
         return made
+
+    def _repr_html_(self) -> str:
+        made = self.to_xarray()
+        names = made["outcome"].values.tolist()
+        parts = [made[name].values.reshape(-1, len(names)) for name in ("probability", "low", "high")]
+        rows = []
+        for i, cell in enumerate(self.cells):
+            found = [""] * len(names) if cell.result is None else [
+                " ".join(estimate(*(float(part[i, k]) for part in parts), least=3)) for k in range(len(names))
+            ]  # fmt: skip
+            note = f"no equilibrium: escapes {cell.escape_time:.4g} before T" if cell.result is None else ""
+            rows.append([*(f"{value}" for value in cell.values.values()), *found, note])
+        head = [*map(short, self.grid), *(f"P({name})" for name in names), ""]
+        return as_html(repr(self), head, thinned(rows), line(f"{percent(_LEVEL)} intervals, each by itself"))
 
     def __repr__(self) -> str:
         size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())

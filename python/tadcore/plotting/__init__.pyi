@@ -1,6 +1,7 @@
 from .motion.animation import Animation as Animation
 from .run.compare import compare as compare
 from .run.externality import externality as externality
+from .run.foreign import run_of as run_of
 from .run.gains import gains as gains
 from .run.network import network as network
 from .run.raster import MAX_ROWS as MAX_ROWS, visibility as visibility

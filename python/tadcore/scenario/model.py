@@ -33,6 +33,7 @@ from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, mode
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.files import as_path, write_whole
+from tadcore._shared.html import as_html, line, thinned
 from tadcore._shared.limits import MOST_DEFENDERS, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore._shared.toml import parse_toml, read_text
 from tadcore.errors import ScenarioError
@@ -294,6 +295,28 @@ class Scenario(CheckedModel):
         return f"Scenario({self.interaction}, {defenders}, dim={self.dim}, T={self.horizon:g}, δ={self.step:g})"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        sight = dict(zip(self.constrained, self.visibility_radii, strict=True))
+        capture = dict(zip([*self.players[: self.n], "attacker"], self.capture_radii, strict=True))
+        efforts = [
+            *(d.control_weight for d in self.defenders),
+            self.target.control_weight,
+            self.attacker.control_weight,
+        ]
+        rows = [
+            [
+                player,
+                f"({', '.join(f'{x:g}' for x in at)})",
+                f"{sight.get(player, math.inf):g}".replace("inf", "∞"),
+                f"{capture[player]:g}" if player in capture else "–",
+                f"{effort:g}",
+                "",
+            ]
+            for player, at, effort in zip(self.players, self.positions, efforts, strict=True)
+        ]
+        head = ["", "starts at", "visibility ζ", "capture σ", "control weight r", ""]
+        return as_html(self.describe().split("\n", 1)[0], head, thinned(rows), line(self.describe().splitlines()[1]))
 
     @model_serializer(mode="wrap")
     def _without_foreign_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
 from tadcore._shared.calls import public
+from tadcore._shared.html import as_html
 from tadcore.game.compiled import game_of
-from tadcore.game.outcome import Outcome, kind_counts
+from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .rules import capture_rows, compare, visibility_rows
@@ -19,6 +20,8 @@ from .termination import Termination, as_termination
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import pandas
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +44,8 @@ class Batch:
     passed : ndarray of bool, shape (M,), or None
         Whether a capture radius was entered between two instants, before the one that ended the game: with continuous
         termination the game would end there. Not looked for after a divergence. None where that was not asked for.
+    n : int
+        Number of defenders.
     """
 
     kind: NDArray[np.int8]
@@ -48,6 +53,22 @@ class Batch:
     time: Floats
     diverged: NDArray[np.bool_]
     passed: NDArray[np.bool_] | None = None
+    n: int = 0
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row for each game: ``outcome``, a categorical as in a study's table, and the arrays."""
+        import pandas
+
+        names = ["timeout", "captured", *(f"d{i + 1}" for i in range(self.n)), DIVERGED]
+        code = np.where(self.kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + self.defender, self.kind)
+        code = np.where(self.diverged, len(names) - 1, code)
+        columns = {"kind": self.kind, "defender": self.defender, "time": self.time, "diverged": self.diverged}
+        columns |= {} if self.passed is None else {"passed": self.passed}
+        return pandas.DataFrame({"outcome": pandas.Categorical.from_codes(code, names), **columns})
+
+    def _repr_html_(self) -> str:
+        rows = [[name, f"{count:,}", ""] for name, count in self.counts().items()]
+        return as_html(f"{len(self):,} games", ["outcome", "count", ""], rows)
 
     def counts(self) -> dict[str, int]:
         """How many games ended in each way; those that diverged, if any, are counted as ``"diverged"`` alone."""
@@ -63,7 +84,7 @@ class Batch:
     def __getitem__(self, index: int | slice) -> Outcome | Batch:
         if isinstance(index, slice):
             passed = None if self.passed is None else self.passed[index]
-            return Batch(self.kind[index], self.defender[index], self.time[index], self.diverged[index], passed)
+            return Batch(self.kind[index], self.defender[index], self.time[index], self.diverged[index], passed, self.n)
         end = int(self.kind[index]), int(self.defender[index]), float(self.time[index])
         return Outcome.of(*end, diverged=bool(self.diverged[index]))
 
@@ -144,4 +165,4 @@ def simulate_batch(
     kind, defender, time, diverged, passed = game.simulate_batch(
         starts, sight, capture, continuous=continuous, passes=looking, threads=workers
     )
-    return Batch(kind, defender, time, diverged, passed if looking else None)
+    return Batch(kind, defender, time, diverged, passed if looking else None, sc.n)

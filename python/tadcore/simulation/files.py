@@ -102,6 +102,11 @@ def dataset_of(run: Written) -> xr.Dataset:
                 run.adjacency,
                 _about("entry j: sees player j; own entry: sees the attacker", "A", "eq:extadj"),
             ),
+            "sees": (
+                ("time", "player", "seen"),
+                sees_of(run),
+                _about("whether a player sees another; not itself; who has no radius sees all", "", "eq:limob"),
+            ),
             "gain": (team, run.gains, _about("feedback rows, u_i = gain @ z", "K_i I_i", "eq:nwadapt")),
         },
         coords={
@@ -110,6 +115,7 @@ def dataset_of(run: Written) -> xr.Dataset:
             "axis": list("xyz"[: sc.dim]),
             "observer": list(sc.constrained),
             "entry": list(sc.players[:-1]),
+            "seen": list(sc.players),
             "term": list(theta_terms(sc.interaction)),
         },
         attrs={
@@ -122,6 +128,17 @@ def dataset_of(run: Written) -> xr.Dataset:
             **record_of(run),
         },
     )
+
+
+def sees_of(run: Written) -> NDArray[np.bool_]:
+    """Who sees whom of all players, at every instant: 𝒜 without its fold, and rows of ones for unlimited sight."""
+    rows, m, size = run.adjacency.shape
+    sees = np.ones((rows, size + 1, size + 1), dtype=np.bool_)
+    sees[:, :m, :size] = run.adjacency
+    own = np.arange(m)
+    sees[:, own, size] = run.adjacency[:, own, own]  # an entry of its own row says whether it sees the attacker
+    sees[:, np.arange(size + 1), np.arange(size + 1)] = False
+    return sees
 
 
 def variant_of(run: Written) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from .variants import told
 if TYPE_CHECKING:
     import os
 
+    import pandas
     import xarray
 
     from tadcore.plotting import Animation
@@ -207,6 +208,28 @@ class Run:
         from .files import save
 
         save(self, path)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The motion as a table: one row for each instant and player, with position, control and distance to a.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Indexed by (time, player); columns ``x``, ``y``, in space ``z``, ``control_x`` and so on, ``distance``.
+        """
+        import pandas
+
+        axes = "xyz"[: self.scenario.dim]
+        distance = np.linalg.norm(self.position - self.position[:, -1:], axis=-1)
+        columns = {axis: self.position[..., i] for i, axis in enumerate(axes)}
+        columns |= {f"control_{axis}": self.control[..., i] for i, axis in enumerate(axes)} | {"distance": distance}
+        index = pandas.MultiIndex.from_product([self.times, self.scenario.players], names=["time", "player"])
+        return pandas.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+
+    def _repr_html_(self) -> str:
+        from .shown import html_of
+
+        return html_of(self)
 
     def __repr__(self) -> str:
         later = self.changes_after_divergence

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
+from tadcore._shared.html import as_html
 from tadcore._shared.shares import estimate, percent
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
@@ -113,7 +114,7 @@ class Comparison:
         columns = {name: getattr(self, name) for name in ("difference", "low", "high", "only_a", "only_b", "p_value")}
         return pd.DataFrame(columns, index=pd.Index(self.names, name="outcome"))
 
-    def __repr__(self) -> str:
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
         rows = [
             [name, f"{a:,}", f"{b:,}", shown[0], _p_text(p), shown[1]]
             for name, a, b, shown, p in zip(
@@ -122,7 +123,13 @@ class Comparison:
         ]
         head = ["outcome", "only A", "only B", "P(A) - P(B)", "p-value", f"{percent(self.level)} ({self.method})"]
         by = f", {self.rule}" if self.rule else ""
-        return as_text(f"{self.trials:,} trials{by}, {len(self.flipped):,} flipped", head, rows)
+        return f"{self.trials:,} trials{by}, {len(self.flipped):,} flipped", head, rows
+
+    def __repr__(self) -> str:
+        return as_text(*self._table())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._table())
 
     def _texts(self) -> list[tuple[str, str]]:
         columns = zip(self.difference, self.low, self.high, strict=True)

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from tadcore import _core
 from tadcore._shared.arrays import Floats, Integers, as_amount, as_index
+from tadcore._shared.html import as_html
 from tadcore._shared.shares import decimals, percent, share
 from tadcore.errors import ScenarioError
 
@@ -100,6 +101,17 @@ class Incidence:
         by = f"; {self.rule}" if self.rule else ""
         bands = f"{percent(self.level)} bands ± {share(self.half_width, places)}"
         return f"Incidence({self.trials:,} trials up to t = {self.times[-1]:g}: {ends}; {bands}{by})"
+
+    def _repr_html_(self) -> str:
+        title = f"{self.trials:,} trials{f', {self.rule}' if self.rule else ''}: share that has ended by t"
+        at = np.linspace(0, len(self.times) - 1, min(len(self.times), 9)).round().astype(int)[1:]
+        places = decimals(0.0, 2.0 * self.half_width)
+        head = ["outcome", *(f"t = {self.times[k]:.4g}" for k in at), f"{percent(self.level)} bands"]
+        rows = [
+            [name, *(share(float(self.estimate[i, k]), places) for k in at), f"± {share(self.half_width, places)}"]
+            for i, name in enumerate(self.names)
+        ]
+        return as_html(title, head, rows)
 
 
 def incidence(

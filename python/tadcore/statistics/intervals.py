@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
+from tadcore._shared.html import as_html
 from tadcore._shared.shares import estimate, percent
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError
@@ -90,10 +91,15 @@ class OutcomeProbabilities:
         columns = zip(self.names, self.count, self.estimate, self.low, self.high, strict=True)
         return [(name, f"{count:,}", *estimate(p, low, high)) for name, count, p, low, high in columns]
 
-    def __repr__(self) -> str:
+    def _table(self) -> tuple[str, list[str], list[tuple[str, str, str, str]]]:
         head = ["outcome", "count", "estimate", f"{percent(self.level)} ({self.method})"]
-        by = f", {self.rule}" if self.rule else ""
-        return as_text(f"{self.trials:,} trials{by}", head, self.rows())
+        return f"{self.trials:,} trials{f', {self.rule}' if self.rule else ''}", head, self.rows()
+
+    def __repr__(self) -> str:
+        return as_text(*self._table())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._table())
 
 
 def probabilities(

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, Integers
+from tadcore._shared.html import as_html, line, thinned
 from tadcore._shared.shares import estimate, percent
 from tadcore.errors import ScenarioError
 
 from .comparison import difference_interval
+from .outcomes import excluding
 from .single_radii import Breakpoints, SmallestRadius
 
 if TYPE_CHECKING:
@@ -166,6 +168,23 @@ class RadiusCurve:
             f"{self.radii[-1]:g}], {self.trials:,} trials: P(intercepted) from {least} to {most}, "
             f"{percent(self.level)}{by})"
         )
+
+    def _repr_html_(self) -> str:
+        by = f", {self.rule}" if self.rule else ""
+        title = f"{self.radius} radius of {self.player}, {self.trials:,} trials at each{by}"
+        head, rows = _rows(self)
+        return as_html(title, head, thinned(rows), line(f"{percent(self.level)}, at all radii at once"))
+
+
+def _rows(curve: RadiusCurve) -> tuple[list[str], list[list[str]]]:
+    """Every radius with the probabilities of what excludes one another, and their bands."""
+    shown = excluding(curve.names)
+    parts = (curve.estimate, curve.band_low, curve.band_high)
+    rows = [
+        [f"{radius:g}", *(" ".join(estimate(*(float(part[i, r]) for part in parts), least=3)) for i in shown), ""]
+        for r, radius in enumerate(curve.radii)
+    ]
+    return ["radius", *(f"P({curve.names[i]})" for i in shown), ""], rows
 
 
 def paired_differences(

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index, refuse_where
+from tadcore._shared.html import as_html
 from tadcore._shared.shares import estimate as interval, percent
 from tadcore._shared.text import as_text
 from tadcore.errors import ScenarioError, TadcoreError
@@ -93,7 +94,7 @@ class Sensitivity:
         index = pd.MultiIndex.from_product([self.outputs, self.inputs], names=["output", "input"])
         return pd.DataFrame({name: getattr(self, name).ravel() for name in names}, index=index)
 
-    def __repr__(self) -> str:
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
         rows = [
             [
                 f"{output} ← {name}",
@@ -104,7 +105,13 @@ class Sensitivity:
             for i, name in enumerate(self.inputs)
         ]
         level = f"{percent(self.level)} (bootstrap)"
-        return as_text(f"{self.evaluations:,} evaluations", ["output ← input", "first", level, "total", level], rows)
+        return f"{self.evaluations:,} evaluations", ["output ← input", "first", level, "total", level], rows
+
+    def __repr__(self) -> str:
+        return as_text(*self._table())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._table())
 
 
 def sobol(

@@ -31,9 +31,10 @@ import numpy as np
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
 from tadcore._shared.files import as_path
+from tadcore._shared.html import block, line
 from tadcore.errors import OutOfMemoryError
 from tadcore.scenario.model import Scenario
-from tadcore.scenario.paths import ByPath
+from tadcore.scenario.paths import ByPath, short
 from tadcore.scenario.quantities import setups
 from tadcore.simulation.run import Run, simulate
 from tadcore.statistics.stopping import Stopping
@@ -326,6 +327,14 @@ class StudyResult(Trials):
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts().items())
         by = f"; {self.stopping}" if self.stopping is not None else ""
         return f"StudyResult({self.trials:,}{asked} trials: {ends}{by})"
+
+    def _repr_html_(self) -> str:
+        if not self.trials:
+            return block(repr(self))
+        varied = ", ".join(map(short, self.study.vary))
+        return block(
+            repr(self.scenario), line(f"varies {varied}; seed {self.seed}"), self.probabilities()._repr_html_()
+        )
 
 
 def load_study(folder: str | os.PathLike[str]) -> StudyResult:

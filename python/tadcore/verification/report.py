@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias
 
+from tadcore._shared.html import as_html, line
 from tadcore.errors import UNDECIDED, VerificationError
 
 Status: TypeAlias = Literal["passed", "failed", "undecided"]
@@ -241,6 +242,21 @@ class VerificationReport:
 
     def __repr__(self) -> str:
         return "\n".join(self.lines())
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [
+                c.name,
+                f"{c.value:.2e}" if c.measured else _NOTHING,
+                f"≤ {c.bound:.1e}",
+                _STATE[c.status],
+                f"{c.source}{'' if c.ok else ' → ' + (c.remedy if c.converged else UNDECIDED)}",
+            ]
+            for c in self.checks
+        ]
+        measured = [line(f"{m.name} {m.value:.4g}: {m.meaning}") for m in self.measurements]
+        notes = [line(f"note: {note}") for note in self.notes]
+        return as_html(self.lines()[0], ["check", "value", "bound", "", "source"], rows, *measured, *notes)
 
 
 def combine(title: str, parts: Iterable[VerificationReport]) -> VerificationReport:
