@@ -18,10 +18,11 @@ from .checks.adapted_nash import check_nafne
 from .checks.claims import BY_POSITIONS_ALONE
 from .checks.consistency import check_consistency
 from .checks.decentral import check_decentral
+from .checks.ending import stops_early
 from .checks.gains import check_gains
 from .checks.geometry import check_geometry
 from .checks.nash import check_equilibrium
-from .checks.record import check_record
+from .checks.record import check_record, check_rows
 from .checks.steps import check_steps
 from .oracle.draws import as_seed
 from .report import Check, VerificationReport, combine, unresolved
@@ -98,9 +99,6 @@ def verify(
     except TadcoreError as error:
         return combine(f"{sc.interaction}: not played", [_undecided("play", error)])
     title = f"{sc.interaction}: {run.outcome}"
-    if run.diverged is not None and run.times[-1] < run.outcome.time:
-        why = f"the game {run.diverged}: it leaves the range of double precision after t = {run.times[-1]:g}"
-        return combine(title, [_undecided("play", TadcoreError(why))])
 
     def family(name: str, check: Callable[[], VerificationReport]) -> VerificationReport:
         """The checks of one module, or one undecided check where they cannot be computed."""
@@ -110,6 +108,9 @@ def verify(
         except (ArithmeticError, np.linalg.LinAlgError, TadcoreError) as error:
             return _undecided(name, error)
 
+    if run.diverged is not None and stops_early(run):
+        why = f"the game {run.diverged}: it leaves the range of double precision after t = {run.times[-1]:g}"
+        return combine(title, [family("record", lambda: check_rows(run)), _undecided("play", TadcoreError(why))])
     parts = [
         family("fne", lambda: check_equilibrium(sc, equilibrium, refine=True)),
         family("record", lambda: check_record(run, equilibrium)),

@@ -18,6 +18,8 @@ from tadcore.game import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.verification.checks.claims import RECORD
 
+RECORD_ARRAYS = ("times", "position", "control", "adjacency", "gains", "theta", "theta_terms")
+
 NAMES = ("paper-i1", "paper-i2", "paper-i1-suicidal")
 
 
@@ -418,3 +420,26 @@ def test_a_divergence_is_recomputed(run):
         Divergence(lost.diverged.time + 1e-4, size),
     ):
         refused(lost, "record.divergence", diverged=other)
+
+
+def test_an_invented_divergence_does_not_excuse_a_record_that_is_cut_short(run):
+    half = {name: getattr(run, name)[:100] for name in RECORD_ARRAYS} | {"certified": 100}
+    invented = dataclasses.replace(run, **half, diverged=Divergence(float(run.times[20]), 1e125))
+    report = v.verify(invented)
+    assert report.status == "failed"
+    assert [check.name for check in report.failures] == ["record.divergence"]
+    unstable = {"attacker.control_weight": 0.3, "horizon": 40.0, "step": 0.05}
+    lost = tadcore.simulate(tadcore.scenarios.load("paper-i2").replace(unstable))
+    assert lost.times[-1] < lost.outcome.time
+    report = v.verify(lost)
+    assert report.status == "undecided"
+    assert [check.name for check in report.undecided] == ["play"]
+    for name, field, change in (
+        ("record.start", "position", lambda x: x + 1e-6 * (np.arange(len(x)) == 0)[:, None, None]),
+        ("record.times", "times", lambda t: t * (1.0 + 1e-15)),
+        ("record.network", "adjacency", lambda seen: seen ^ (np.arange(len(seen)) == 9)[:, None, None]),
+    ):
+        spoilt = dataclasses.replace(lost, **{field: change(getattr(lost, field))})
+        assert name in [check.name for check in v.verify(spoilt).failures]
+    told = dataclasses.replace(lost, diverged=dataclasses.replace(lost.diverged, size=1e9))
+    assert [check.name for check in v.verify(told).failures] == ["record.divergence"]

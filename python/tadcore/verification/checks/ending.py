@@ -59,8 +59,16 @@ def check_outcome(run: Run) -> Check:
     return RECORD["record.outcome"].judge(worst, why if worst > 0.0 else f"{run.outcome}")
 
 
+def stops_early(run: Run) -> bool:
+    """Whether the last row is before the end, as where a game leaves the range of double precision."""
+    return bool(np.size(run.times) and run.times[-1] < run.outcome.time)
+
+
 def check_divergence(run: Run) -> Check:
-    """By how much the distances contradict the recorded instant and size of the divergence, relative to both."""
+    """By how much the distances contradict the recorded instant and size of the divergence, relative to both.
+
+    A record that stops before its end tells a lower bound on the size.
+    """
     at = run.position
     scale = max(float(distances(at[0][:, np.newaxis], at[0][np.newaxis]).max()), TINY)
     size = distances(at[:, :-1], at[:, -1:]).max(axis=1) / scale
@@ -72,7 +80,8 @@ def check_divergence(run: Run) -> Check:
         return claim.judge(_NONE, f"t = {run.diverged.time!r} is no instant of the record")
     k = int(named[0])
     before, then = float(size[:k].max(initial=0.0)), float(size[k])
-    off = abs(float(size.max()) / run.diverged.size - 1.0)
+    off = float(size.max()) / max(run.diverged.size, TINY) - 1.0
+    off = off if stops_early(run) else abs(off)
     return claim.judge(
         max(before / SIZE - 1.0, 1.0 - then / SIZE, off), f"size {then:.6g} at t = {run.diverged.time:g}"
     )
