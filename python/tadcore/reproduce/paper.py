@@ -42,7 +42,8 @@ def reproduce(out: str | os.PathLike[str], *, figures: bool = True, console: Con
     ----------
     out : path
         The folder to write into; made if it is missing, other files in it are left alone. Everything is prepared
-        elsewhere first and copied there at the end, each file whole, so an interrupted call leaves ``out`` as it was.
+        elsewhere first and copied there at the end, each file whole; a call interrupted before that leaves ``out`` as
+        it was.
     figures : bool
         Whether to draw the figures, each as PNG and PDF.
     console : rich.console.Console, optional
