@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import os
+import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -91,7 +92,8 @@ class SweepResult:
         -------
         xarray.Dataset
             Its dimensions are the swept paths, in normal form, and ``outcome``; a defender's path is there in its
-            short form too, as in ``sel({"d1.visibility_radius": 2.0})``. Variables: ``count``, ``probability`` (the
+            short form too, as in ``sel({"d1.visibility_radius": 2.0})``, and every path as a keyword, as in
+            ``sel(attacker_control_weight=0.8)``. Variables: ``count``, ``probability`` (the
             share of the trials) with the ends ``low`` and ``high`` of its 95 % interval (as `StudyResult.probabilities`
             has it, in each cell by itself) and ``mean_time`` of every outcome (with ``"diverged"`` where games did in
             some cell), ``trials``, ``mean_end`` (the mean time of all games) and ``escape_time``; ``status`` is a
@@ -133,6 +135,9 @@ class SweepResult:
         for path in self.grid:
             if short(path) != path:  # the same values under the name that people write
                 made = made.assign_coords({short(path): (path, made[path].values)}).set_xindex(short(path))
+            keyword = re.sub(r"\W+", "_", short(path))
+            if keyword not in made.coords:  # the same again as a name that Python takes for a keyword
+                made = made.assign_coords({keyword: (path, made[path].values)}).set_xindex(keyword)
         return made
 
     def _repr_html_(self) -> str:

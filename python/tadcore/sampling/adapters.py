@@ -191,6 +191,9 @@ def as_sampler(field: str, value: Any) -> Sampler:
     if isinstance(value, list | tuple | np.ndarray):
         if not np.shape(value) and not isinstance(value, list | tuple):
             raise ScenarioError(field, value, f"{_RULE}; a fixed value belongs in the scenario")
+        if isinstance(value, tuple) and len(value) == 2 and all(isinstance(one, list | tuple) for one in value):
+            rule = "a Box for all that lies between the two, or a list of the two for a choice between them"
+            raise ScenarioError(field, value, rule)
         return _named(field, lambda: Choice(value))
     fixed = isinstance(value, int | float | np.number)
     raise ScenarioError(field, value, f"{_RULE}; a fixed value belongs in the scenario" if fixed else _RULE)

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tadcore.errors import ScenarioError
 
+from .described import DEPRECATED, described, plain_signature
 from .fields import path_of, scenario_error
 from .paths import AXES, normal
 
@@ -30,6 +31,9 @@ _IMMUTABLE = "left as it is: scenarios are immutable, use replace"
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(Field,))
 class _CheckedMeta(ModelMetaclass):
     """Only a call from outside comes through here; pydantic builds nested models without calling the class."""
+
+    def __dir__(cls) -> list[str]:  # noqa: N805
+        return [name for name in super().__dir__() if name not in DEPRECATED]
 
     if not TYPE_CHECKING:  # a type checker knows the fields that the constructor takes
 
@@ -54,6 +58,16 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
 
     _root: ClassVar[str] = ""
     """What the path of a field starts with when this model stands alone."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Say in the docstring what every field is, and in the signature what it takes, in plain types."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.__doc__ = described(cls)
+        cls.__signature__ = plain_signature(cls)
+
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if name not in DEPRECATED]
 
     if not TYPE_CHECKING:  # a type checker knows that the fields are frozen
 

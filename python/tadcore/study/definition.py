@@ -159,5 +159,5 @@ class Definition:
         )
 
     def __repr__(self) -> str:
-        paths = ", ".join(self.vary)
+        paths = ", ".join(f"{path} ({type(sampler).__name__})" for path, sampler in self.vary.items())
         return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"

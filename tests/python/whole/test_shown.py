@@ -1,6 +1,7 @@
 """Results as notebooks show them, and as tables of pandas."""
 
 import base64
+import inspect
 from html.parser import HTMLParser
 
 import matplotlib.pyplot as plt
@@ -167,3 +168,35 @@ def test_a_foreign_trajectory_is_drawn_by_the_same_figures(shown, agg):
         given = {"times": own.times, "position": own.position} | wrong
         with pytest.raises(tadcore.ScenarioError, match=next(iter(wrong))):
             plotting.run_of(own.scenario, **given)
+
+
+@pytest.mark.parametrize("model", [tadcore.Scenario, tadcore.Attacker, tadcore.Target, tadcore.Defender])
+def test_help_says_what_every_field_is(model):
+    for name, field in model.model_fields.items():
+        assert f"{name} : " in model.__doc__
+        assert field.description in model.__doc__
+    signature = inspect.signature(model)
+    assert list(signature.parameters) == list(model.model_fields)
+    assert not any(word in str(signature) for word in ("Annotated", "BeforeValidator", "PydanticUndefined"))
+    assert {"json", "dict", "parse_obj", "copy"}.isdisjoint(dir(model))
+    assert {"replace", "model_dump"} <= set(dir(model))
+
+
+def test_completion_of_a_scenario_has_no_deprecated_methods(sc):
+    assert {"json", "dict", "parse_obj", "copy"}.isdisjoint(dir(sc))
+    assert {"replace", "to_toml", "attacker"} <= set(dir(sc))
+
+
+def test_two_points_in_a_tuple_are_refused_and_in_a_list_a_choice(sc):
+    with pytest.raises(tadcore.ScenarioError, match="a Box for all that lies between the two, or a list"):
+        tadcore.Study(sc, {"attacker.position": ([-3, -2], [3, 4])}, trials=4)
+    study = tadcore.Study(sc, {"attacker.position": [[-3, -2], [3, 4]]}, trials=4)
+    assert "attacker.position (Choice)" in repr(study)
+
+
+def test_a_sweep_is_selected_by_keywords(study):
+    made = tadcore.sweep(study, {"d1.visibility_radius": [1.0, 2.0], "attacker.control_weight": [0.8, 1.0]}).to_xarray()
+    by_name = made.sel({"d1.visibility_radius": 2.0, "attacker.control_weight": 0.8})
+    by_keyword = made.sel(d1_visibility_radius=2.0, attacker_control_weight=0.8)
+    assert np.array_equal(by_name["count"], by_keyword["count"])
+    assert made.sizes == {"defenders.0.visibility_radius": 2, "attacker.control_weight": 2, "outcome": 3}
