@@ -30,7 +30,7 @@ MUTANTS = {
         ("expm, large: integral", "«*i += *t / (k + 1) as f64;»", "*i -= *t / (k + 1) as f64;"),
         ("expm, large: doubling of the row", "for_each(|(a, m)| «*a += m»)", "*a -= m"),
     ],
-    "network/visibility.rs": [
+    "network/sight.rs": [
         ("‖z_i − z_j‖", "«(x - y) * (x - y)»", "(x + y) * (x + y)"),
         ("closed ball: ≤", "if «d2 <= limit»", "d2 < limit"),
         ("own row sees the attacker", "let d2 = if «j == i»", "j != i"),

@@ -5,11 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; `cost` stands beside `simulation` and reads its records.
-const LAYERS: [&str; 12] = [
+const LAYERS: [&str; 13] = [
     "error",
     "cancel",
     "memory",
     "simd",
+    "random",
     "game",
     "riccati",
     "network",

@@ -39,9 +39,10 @@
 //! |---|---|
 //! | [`error`], [`cancel`], [`memory`] | failures with their numbers; the flag that stops a computation; memory asked for |
 //! | [`simd`] | vector instructions; loops compiled for each width of the registers |
+//! | [`random`] | numbers as a function of seed, trial, purpose, entity and index |
 //! | [`game`] | weights, horizon and grid, checked; reference games |
 //! | [`riccati`] | P on the grid, escape times, equilibrium feedback |
-//! | [`network`] | who sees whom; what each player may use |
+//! | [`network`] | who sees whom, what fails, who is told; what each player may use |
 //! | [`synthesis`] | the gains at one (instant, topology) |
 //! | [`policy`] | closed loop, one-step transition, the shared (step, topology) table |
 //! | [`simulation`] | one recorded run |
@@ -68,6 +69,7 @@ pub mod error;
 pub mod game;
 pub mod network;
 pub mod policy;
+pub mod random;
 pub mod riccati;
 pub mod simulation;
 pub mod synthesis;

@@ -10,7 +10,7 @@
 //! The network then depends on the past: only single recorded runs have the variant, ensembles do not.
 
 use super::Topology;
-use super::visibility::{observe, squared_distance, squared_norm, squared_reach};
+use super::sight::{observe, squared_distance, squared_norm, squared_reach};
 use crate::error::GameError;
 use crate::game::validation::rule;
 

@@ -61,10 +61,7 @@ impl Topology {
     #[must_use]
     pub fn from_words(rows: usize, size: usize, words: &[u64]) -> Self {
         let mut topology = Self::empty(rows, size);
-        match &mut topology.words {
-            Words::Inline(word) => *word = words[0],
-            Words::Heap(held) => held.copy_from_slice(words),
-        }
+        topology.words_mut().copy_from_slice(words);
         topology
     }
 
@@ -127,22 +124,44 @@ impl Topology {
         Self { words: Words::Inline(out), ..*self }
     }
 
+    /// Row i as a word, for N ≤ 64: bit j is entry (i, j).
+    #[must_use]
+    pub fn row(&self, i: usize) -> u64 {
+        debug_assert!(self.size <= 64, "a word holds at most 64 entries");
+        let (words, bit) = (self.words(), i * self.size);
+        let (word, shift) = (bit / 64, bit % 64);
+        let low = words[word] >> shift;
+        let high = if shift + self.size > 64 { words[word + 1] << (64 - shift) } else { 0 };
+        (low | high) & (u64::MAX >> (64 - self.size))
+    }
+
+    fn words_mut(&mut self) -> &mut [u64] {
+        match &mut self.words {
+            Words::Inline(word) => std::slice::from_mut(word),
+            Words::Heap(words) => words,
+        }
+    }
+
     /// Sets entry (i, j) of 𝒜.
     pub fn set(&mut self, i: usize, j: usize) {
         let bit = i * self.size + j;
-        let words = match &mut self.words {
-            Words::Inline(word) => std::slice::from_mut(word),
-            Words::Heap(words) => words,
-        };
-        words[bit / 64] |= 1 << (bit % 64);
+        self.words_mut()[bit / 64] |= 1 << (bit % 64);
+    }
+
+    /// Clears entry (i, j) of 𝒜.
+    pub fn unset(&mut self, i: usize, j: usize) {
+        let bit = i * self.size + j;
+        self.words_mut()[bit / 64] &= !(1 << (bit % 64));
+    }
+
+    /// Keeps what is in `other`, too, which is of the same size.
+    pub fn keep(&mut self, other: &Self) {
+        self.words_mut().iter_mut().zip(other.words()).for_each(|(a, b)| *a &= b);
     }
 
     /// Forgets every edge.
     pub fn clear(&mut self) {
-        match &mut self.words {
-            Words::Inline(word) => *word = 0,
-            Words::Heap(words) => words.fill(0),
-        }
+        self.words_mut().fill(0);
     }
 
     /// Whether everyone sees everyone.
@@ -171,6 +190,12 @@ mod tests {
                     t.set(i, j);
                     assert_eq!(t.edges(), 1);
                     assert!(t.sees(i, j));
+                    assert!((0..rows).all(|r| t.row(r) == if r == i { 1 << j } else { 0 }));
+                    let mut rest = Topology::complete(rows, size);
+                    rest.unset(i, j);
+                    assert_eq!(rest.edges(), rows * size - 1);
+                    t.keep(&rest);
+                    assert_eq!((t.edges(), rest.sees(i, j)), (0, false));
                 }
             }
             assert!(Topology::complete(rows, size).is_complete());
