@@ -133,7 +133,7 @@ fuzz_target!(|input: Input| {
     assert!(numbers.into_iter().all(|x| x.is_finite() && x >= 0.0), "a pass is not finite");
     for termination in [Termination::Sampled, Termination::Continuous] {
         let one = simulate_with(&policy, &setup, &EdgeRule::PAPER, termination, &cancel).expect("a run");
-        let ends = ensemble::run_with(&policy, &batch, Between { termination, passes: true }, Some(1), &cancel);
+        let ends = ensemble::run_with(&policy, &batch, Between { termination, passes: true }, None, Some(1), &cancel);
         let end = End { passed: !one.passes.is_empty(), ..End::from(&one) };
         assert_eq!(ends.as_deref(), Ok(&[end][..]), "the batch passes or ends otherwise");
         // Without a pass the two ends are one, but for the time.

@@ -1,11 +1,12 @@
 """The compiled core. Everything here is reduced (one Kronecker factor); `tadcore` wraps it."""
 
+from collections.abc import Callable, Sequence
 from typing import Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "Stop", "__version__", "grid_times", "observe", "simd"]
+__all__ = ["Equilibrium", "Gains", "Game", "Record", "Stop", "World", "__version__", "grid_times", "observe", "simd"]
 
 __version__: str
 
@@ -67,7 +68,12 @@ class Game:
         hysteresis: float = 0.0,
         dwell: float = 0.0,
         continuous: bool = False,
-    ) -> Record: ...
+        world: World | None = None,
+        seed: int = 0,
+        trial: int = 0,
+        network: Callable[[int, float, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.bool_]] | None = None,
+    ) -> Record:
+        """One recorded run; `network(k, t, positions, seen)` gives the adjacency in the place of what is seen."""
     def simulate_batch(
         self,
         positions: NDArray[np.float64],
@@ -78,6 +84,9 @@ class Game:
         passes: bool = False,
         threads: int | None = None,
         stop: Stop | None = None,
+        world: World | None = None,
+        seed: int = 0,
+        first_trial: int = 0,
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Kind, defender, time, whether the game diverged, and whether it passed within a radius between instants."""
     def save_table(self) -> bytes:
@@ -95,6 +104,30 @@ class Stop:
     def __new__(cls) -> Stop: ...
     def set(self) -> None: ...
     def is_set(self) -> bool: ...
+
+@final
+class World:
+    """What a run is given besides positions and radii: m numbers of the constrained players, n + 2 disturbances.
+
+    ScenarioError for a number that breaks its rule; inf is never (until a failure) or for good (until the end of one).
+    """
+
+    def __new__(
+        cls,
+        *,
+        mean_time_to_failure: NDArray[np.float64],
+        mean_time_to_repair: NDArray[np.float64],
+        mean_time_detected: NDArray[np.float64],
+        mean_time_missed: NDArray[np.float64],
+        stationary: NDArray[np.bool_],
+        link_radius: Sequence[float | None] | None = None,
+        relays: int | None = None,
+        common_frame: bool = False,
+        link_mean_time_up: NDArray[np.float64] | None = None,
+        link_mean_time_down: NDArray[np.float64] | None = None,
+        link_stationary: bool = False,
+        disturbance: NDArray[np.float64],
+    ) -> World: ...
 
 @final
 class Equilibrium:
@@ -174,6 +207,21 @@ class Record:
     @property
     def adjacency(self) -> NDArray[np.bool_]: ...
     """(L+1, m, N): row i, entry j ≠ i player j, entry i the attacker; the last row repeats the one before."""
+    @property
+    def seen(self) -> NDArray[np.bool_] | None: ...
+    """(L+1, m, N): the sight less what failed; None but in a world or under a network from outside."""
+    @property
+    def sensor_up(self) -> NDArray[np.bool_] | None: ...
+    """(L+1, m); None without a world."""
+    @property
+    def edge_up(self) -> NDArray[np.bool_] | None: ...
+    """(L+1, m, N); None without a world."""
+    @property
+    def link(self) -> NDArray[np.bool_] | None: ...
+    """(L+1, m, m): i hears j, the diagonal false; None without a world."""
+    @property
+    def disturbance(self) -> NDArray[np.float64] | None: ...
+    """(L+1, n+2, dim): what is added to the positions after the step from each row; None without a world."""
     @property
     def gains(self) -> NDArray[np.float64]: ...
     """(L+1, m, N)."""

@@ -8,9 +8,9 @@ use tadcore::cancel::CancelToken;
 use tadcore::cost::costs;
 use tadcore::ensemble::{self, Batch, Between, End};
 use tadcore::game::{Game, Grid, Interaction, Weights};
-use tadcore::network::{EdgeRule, Topology};
+use tadcore::network::Topology;
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{Outcome, Record, Setup, Termination, simulate, simulate_with};
+use tadcore::simulation::{Outcome, Record, Rules, Setup, Termination, simulate, simulate_with};
 use tadcore::synthesis::Synthesizer;
 
 /// A game and a start, before anything is solved.
@@ -215,10 +215,10 @@ proptest! {
         let batch = Batch { dim: *dim, positions: &all, visibility, capture };
         for termination in [Termination::Sampled, Termination::Continuous] {
             let between = Between { termination, passes: true };
-            let ends = ensemble::run_with(&policy, &batch, between, Some(threads), &none).expect("a valid batch");
+            let ends = ensemble::run_with(&policy, &batch, between, None, Some(threads), &none).expect("a valid batch");
             for (end, positions) in ends.iter().zip(&moved) {
                 let one = Drawn { positions: positions.clone(), ..drawn.clone() };
-                let alone = simulate_with(&policy, &one.setup(), &EdgeRule::PAPER, termination, &none).expect("a run");
+                let alone = simulate_with(&policy, &one.setup(), Rules { termination, ..Rules::default() }, &none).expect("a run");
                 prop_assert_eq!(*end, End { passed: !alone.passes.is_empty(), ..End::from(&alone) });
                 prop_assert!(alone.passes.is_empty() || termination == Termination::Sampled);
                 if alone.after > 0.0 {

@@ -34,6 +34,11 @@ pub(crate) fn game(py: Python<'_>, error: GameError) -> PyErr {
     }
 }
 
+/// `ScenarioError` for what the core does not see.
+pub(crate) fn value(py: Python<'_>, field: &str, value: String, rule: String) -> PyErr {
+    raise(py, "ScenarioError", (field, value, rule))
+}
+
 /// `TadcoreError`: no scenario is to blame.
 pub(crate) fn simd(py: Python<'_>, error: &SimdError) -> PyErr {
     raise(py, "TadcoreError", (error.to_string(),))
@@ -85,7 +90,9 @@ pub(crate) fn run(py: Python<'_>, of: &Game, error: RunError) -> PyErr {
     match error {
         RunError::Game(error) => game(py, error),
         RunError::Equilibrium(error) => equilibrium(py, of, &error),
-        RunError::Range { .. } | RunError::Cost { .. } => raise(py, "TadcoreError", (error.to_string(),)),
+        RunError::Range { .. } | RunError::Cost { .. } | RunError::Network { .. } => {
+            raise(py, "TadcoreError", (error.to_string(),))
+        }
         RunError::Threads(threads) => raise(py, "ScenarioError", ("threads", threads, "a number the system can start")),
         RunError::Memory(none) => memory(py, none),
         RunError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),

@@ -10,7 +10,7 @@ use tadcore::ensemble::{self, Batch, Between};
 use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{self, Setup, Termination};
+use tadcore::simulation::{self, Chances, Rules, Setup, Termination};
 use tadcore::synthesis::{Method, Options, Synthesizer};
 
 use super::arrays::{copied, entries};
@@ -18,8 +18,10 @@ use super::equilibrium::Equilibrium;
 use super::gains::Gains;
 use super::generation::Generation;
 use super::guard::guarded;
+use super::outside::Outside;
 use super::record::Record;
 use super::stop::Stop;
+use super::world::World;
 use super::{detach, errors};
 
 /// Weights, horizon and grid; owns the equilibrium and the (step, topology) table.
@@ -176,8 +178,9 @@ impl Game {
         })
     }
 
-    /// One recorded run; with a hysteresis or a dwell time another game than the paper's.
-    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0, continuous=false))]
+    /// One recorded run; with a hysteresis, a dwell time, a world or a network from outside another game than the paper's.
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0, continuous=false,
+        world=None, seed=0, trial=0, network=None))]
     // A keyword for each rule.
     #[allow(clippy::too_many_arguments)]
     fn simulate(
@@ -189,30 +192,37 @@ impl Game {
         hysteresis: f64,
         dwell: f64,
         continuous: bool,
+        world: Option<&Bound<'_, World>>,
+        seed: u64,
+        trial: u64,
+        network: Option<Py<PyAny>>,
     ) -> PyResult<Record> {
         guarded(|| {
             let dim = positions.as_array().ncols();
             let flat = copied(py, &positions)?;
             let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
             let policy = self.policy(py)?;
+            let world = world.map(|world| world.get().core());
+            let outside = network.map(|function| Outside::new(function, &self.game, dim));
             let record = detach::interruptible(py, |cancel| {
                 let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
-                simulation::simulate_with(
-                    &policy,
-                    &setup,
-                    &EdgeRule { hysteresis, dwell },
-                    termination(continuous),
-                    cancel,
-                )
-            })?
-            .map_err(|error| errors::run(py, &self.game, error))?;
+                let rules = Rules {
+                    edges: EdgeRule { hysteresis, dwell },
+                    termination: termination(continuous),
+                    chances: world.map(|world| Chances { world, seed, trial }),
+                    outside: outside.as_ref().map(Outside::network),
+                };
+                simulation::simulate_with(&policy, &setup, rules, cancel)
+            })?;
+            let failed = outside.and_then(Outside::error);
+            let record = record.map_err(|error| failed.unwrap_or_else(|| errors::run(py, &self.game, error)))?;
             Ok(Record::new(policy, record))
         })
     }
 
     /// Outcomes of many runs: kind, defender, time, whether the game diverged, and whether it passed within a radius.
     #[pyo3(signature = (positions, visibility_radii, capture_radii, *, continuous=false, passes=false, threads=None,
-        stop=None))]
+        stop=None, world=None, seed=0, first_trial=0))]
     // A keyword for each rule.
     #[allow(clippy::type_complexity, clippy::too_many_arguments)]
     fn simulate_batch<'py>(
@@ -225,6 +235,9 @@ impl Game {
         passes: bool,
         threads: Option<usize>,
         stop: Option<&Stop>,
+        world: Option<&Bound<'py, World>>,
+        seed: u64,
+        first_trial: u64,
     ) -> PyResult<(
         Bound<'py, PyArray1<i8>>,
         Bound<'py, PyArray1<i32>>,
@@ -237,11 +250,13 @@ impl Game {
             let positions = copied(py, &positions)?;
             let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
             let policy = self.policy(py)?;
+            let world = world.map(|world| world.get().core());
             let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
             let ends = detach::stoppable(py, token, |cancel| {
                 let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
                 let between = Between { termination: termination(continuous), passes };
-                ensemble::run_with(&policy, &batch, between, threads, cancel)
+                let chances = world.map(|world| Chances { world, seed, trial: first_trial });
+                ensemble::run_with(&policy, &batch, between, chances, threads, cancel)
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
             let grid = self.game.grid();

@@ -10,8 +10,10 @@ mod gains;
 mod game;
 mod generation;
 mod guard;
+mod outside;
 mod record;
 mod stop;
+mod world;
 
 use guard::guarded;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -32,6 +34,8 @@ mod _core {
     use super::record::Record;
     #[pymodule_export]
     use super::stop::Stop;
+    #[pymodule_export]
+    use super::world::World;
     use super::*;
 
     /// Who sees whom at positions of shape (n + 2, dim), shape (m, N), by the arithmetic of a run.

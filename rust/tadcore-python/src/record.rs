@@ -5,8 +5,9 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use tadcore::cost;
+use tadcore::network::Topology;
 use tadcore::policy::Policy;
-use tadcore::simulation::{Pass, Record as CoreRecord};
+use tadcore::simulation::{Pass, Record as CoreRecord, State};
 
 use super::arrays::{entries, shaped};
 use super::guard::guarded;
@@ -31,6 +32,21 @@ impl Record {
     fn players(&self) -> usize {
         self.policy.game().n() + 2
     }
+
+    /// What was up, row by row, in a world.
+    fn states(&self) -> Option<&[State]> {
+        self.record.course.as_ref().map(|course| &*course.states).filter(|states| !states.is_empty())
+    }
+}
+
+/// Networks of one size, one for each row.
+fn networks<'py, T>(
+    py: Python<'py>,
+    rows: &[T],
+    network: impl Fn(&T) -> &Topology,
+) -> PyResult<Bound<'py, PyArray3<bool>>> {
+    let (m, n) = rows.first().map_or((0, 0), |row| (network(row).rows(), network(row).size()));
+    entries(py, (rows.len(), m, n), |e| network(&rows[e / (m * n)]).sees(e / n % m, e % n))
 }
 
 #[pymethods]
@@ -94,9 +110,45 @@ impl Record {
     /// 𝒜, shape (L + 1, m, N).
     #[getter]
     fn adjacency<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<bool>>> {
-        let (m, n) = (self.policy.game().constrained(), self.policy.game().size());
-        let networks = &self.record.networks;
-        guarded(|| entries(py, (self.rows(), m, n), |e| networks[e / (m * n)].sees(e / n % m, e % n)))
+        guarded(|| networks(py, &self.record.networks, |network| network))
+    }
+
+    /// Who saw whom, shape (L + 1, m, N); `None` but in a world or under a network from outside.
+    #[getter]
+    fn seen<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<bool>>>> {
+        let Some(course) = &self.record.course else { return Ok(None) };
+        guarded(|| networks(py, &course.seen, |seen| seen).map(Some))
+    }
+
+    /// Sensors that worked, shape (L + 1, m); `None` without a world.
+    #[getter]
+    fn sensor_up<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<bool>>>> {
+        let Some(states) = self.states() else { return Ok(None) };
+        let m = self.policy.game().constrained();
+        guarded(|| entries(py, (self.rows(), m), |e| states[e / m].sensors.sees(0, e % m)).map(Some))
+    }
+
+    /// Edges that were detected where they were within sight, shape (L + 1, m, N); `None` without a world.
+    #[getter]
+    fn edge_up<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<bool>>>> {
+        let Some(states) = self.states() else { return Ok(None) };
+        guarded(|| networks(py, states, |state| &state.edges).map(Some))
+    }
+
+    /// Who heard whom, shape (L + 1, m, m), the diagonal false; `None` without a world.
+    #[getter]
+    fn link<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<bool>>>> {
+        let Some(states) = self.states() else { return Ok(None) };
+        guarded(|| networks(py, states, |state| &state.links).map(Some))
+    }
+
+    /// Displacements after the step from each row, shape (L + 1, n + 2, dim), the last row 0; `None` without a world.
+    #[getter]
+    fn disturbance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        let Some(course) = self.record.course.as_ref().filter(|course| !course.states.is_empty()) else {
+            return Ok(None);
+        };
+        guarded(|| shaped(py, &course.disturbance, (self.rows(), self.players(), self.record.dim)).map(Some))
     }
 
     /// Gain rows, shape (L + 1, m, N).

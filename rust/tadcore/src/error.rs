@@ -147,6 +147,12 @@ pub enum RunError {
         /// The time of the end.
         time: f64,
     },
+    /// A network from outside could not be given.
+    #[error("the network of the run could not be given at t = {time}")]
+    Network {
+        /// The instant at which it was asked for.
+        time: f64,
+    },
     /// The system gave no threads.
     #[error("threads is {0}, but the system would not start that many")]
     Threads(usize),

@@ -27,6 +27,9 @@ pub fn sweep_any(
         if over != 0 {
             return Stop::Over(block, over);
         }
+        if let Some(network) = &mut blocks.network {
+            network.apply(block, z, keys);
+        }
         let mut slots = [0; BLOCK];
         for (l, slot) in slots.iter_mut().enumerate() {
             words.iter_mut().zip(&*keys).for_each(|(word, of_trials)| *word = of_trials[l]);

@@ -11,6 +11,7 @@
 //! A [`Sweep`] moves blocks; [`super::sweep`] has it compiled for the sizes that matter, [`super::anysize`] for all
 //! others.
 
+use super::network::Network;
 use crate::policy::step_table::StepTable;
 use crate::simd::Width;
 
@@ -33,7 +34,6 @@ pub struct Shape {
 }
 
 /// The trials of a chunk, block after block.
-#[derive(Debug)]
 pub struct Blocks {
     /// States.
     pub z: Vec<PerTrial>,
@@ -47,6 +47,8 @@ pub struct Blocks {
     pub sight_step: usize,
     /// The same for the capture radii.
     pub capture_step: usize,
+    /// What comes between sight and network; nothing in the paper's game.
+    pub network: Option<Box<Network>>,
     /// Trials that still play; they fill the blocks from the front.
     pub live: usize,
 }
@@ -80,6 +82,9 @@ impl Blocks {
             for e in 0..step {
                 numbers[to / BLOCK * step + e][to % BLOCK] = numbers[from / BLOCK * step + e][from % BLOCK];
             }
+        }
+        if let Some(network) = &mut self.network {
+            network.copy(from, to);
         }
     }
 }

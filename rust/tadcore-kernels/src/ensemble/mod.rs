@@ -2,4 +2,5 @@
 
 pub mod anysize;
 pub mod block;
+pub mod network;
 pub mod sweep;

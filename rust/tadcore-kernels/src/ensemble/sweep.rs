@@ -52,7 +52,7 @@ fn norm<V: Simd, const D: usize>(z: &[PerTrial], i: usize) -> V::Eight {
 
 /// ‖z_i − z_j‖² of eight trials.
 #[inline(always)]
-fn distance<V: Simd, const D: usize>(z: &[PerTrial], i: usize, j: usize) -> V::Eight {
+pub fn distance<V: Simd, const D: usize>(z: &[PerTrial], i: usize, j: usize) -> V::Eight {
     let first = V::Eight::load(&z[i * D]) - V::Eight::load(&z[j * D]);
     let mut sum = first * first;
     for x in 1..D {
@@ -193,13 +193,18 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
             let block = first + ready;
             let sight = &blocks.sight[block * blocks.sight_step..][..M];
             let capture = &blocks.capture[block * blocks.capture_step..][..N];
-            let (seen, over) = observe::<V, N, M, D>(z, sight, capture, &blocks.far[block]);
+            let (mut seen, over) = observe::<V, N, M, D>(z, sight, capture, &blocks.far[block]);
             if over != 0 {
                 let over = u32::from(over) & playing(blocks.live, block);
                 if over != 0 {
                     stop = Stop::Over(block, over);
                     break;
                 }
+            }
+            if let Some(network) = &mut blocks.network {
+                keys[0] = V::keys(seen);
+                network.apply(block, z, keys);
+                seen = V::load_keys(&keys[0]);
             }
             if !look_up::<V, N, M>(seen, direct, table, slots) {
                 keys[0] = V::keys(seen);

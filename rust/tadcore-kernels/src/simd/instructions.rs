@@ -34,6 +34,7 @@ pub trait Simd: Copy {
     /// The keys with `bit` set in the lanes of a mask.
     fn set(keys: Self::Keys, bit: u64, lanes: <Self::Eight as Number>::Mask) -> Self::Keys;
     fn keys(keys: Self::Keys) -> [u64; 8];
+    fn load_keys(keys: &[u64; 8]) -> Self::Keys;
     /// The low 16 bits of each key, four in a word.
     fn low(keys: Self::Keys) -> [u64; 2];
 }
@@ -72,6 +73,10 @@ impl Simd for Baseline {
     #[inline(always)]
     fn keys(keys: [u64; 8]) -> [u64; 8] {
         keys
+    }
+    #[inline(always)]
+    fn load_keys(keys: &[u64; 8]) -> [u64; 8] {
+        *keys
     }
     #[inline(always)]
     fn low(keys: [u64; 8]) -> [u64; 2] {

@@ -132,6 +132,11 @@ impl Simd for Baseline {
         out
     }
     #[inline(always)]
+    fn load_keys(keys: &[u64; 8]) -> Self::Keys {
+        // SAFETY: the target has NEON; reads the 2 words of each pair.
+        std::array::from_fn(|i| unsafe { vld1q_u64(keys[2 * i..2 * i + 2].as_ptr()) })
+    }
+    #[inline(always)]
     fn low(keys: Self::Keys) -> [u64; 2] {
         low(Self::keys(keys))
     }

@@ -164,6 +164,12 @@ impl Simd for Avx2 {
         out
     }
     #[inline(always)]
+    fn load_keys(keys: &[u64; 8]) -> Self::Keys {
+        let (low, high) = keys.split_at(4);
+        // SAFETY: the caller is compiled for AVX2; reads the 8 words of `keys`.
+        unsafe { [_mm256_loadu_si256(low.as_ptr().cast()), _mm256_loadu_si256(high.as_ptr().cast())] }
+    }
+    #[inline(always)]
     fn low(keys: Self::Keys) -> [u64; 2] {
         // SAFETY: the caller is compiled for AVX2; registers alone.
         unsafe {
@@ -216,6 +222,11 @@ impl Simd for Avx512 {
         // SAFETY: the caller is compiled for AVX-512F; writes the 8 words of `out`.
         unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), keys) };
         out
+    }
+    #[inline(always)]
+    fn load_keys(keys: &[u64; 8]) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; reads the 8 words of `keys`.
+        unsafe { _mm512_loadu_si512(keys.as_ptr().cast()) }
     }
     #[inline(always)]
     fn low(keys: __m512i) -> [u64; 2] {

@@ -9,7 +9,6 @@ use super::trials::Trials;
 use super::{Between, End};
 use crate::cancel::CancelToken;
 use crate::error::RunError;
-use crate::network::{Topology, observe};
 use crate::simulation::crossing::{clear, near};
 use crate::simulation::passes::Step;
 use crate::simulation::{Pass, Reach, Termination};
@@ -104,11 +103,7 @@ impl Watch {
             return Ok(false);
         }
         let (start, now) = (self.state(trial, size * dim), trials.state(place));
-        let sight: Vec<f64> = (0..trials.shape.rows)
-            .map(|i| trials.blocks.sight[place / BLOCK * trials.blocks.sight_step + i][place % BLOCK])
-            .collect();
-        let mut network = Topology::empty(trials.shape.rows, size);
-        observe(&start, dim, &sight, &mut network);
+        let network = trials.network(place, &start);
         let policy = trials.policy.at(k, &network, &mut self.solver, cancel)?;
         let reach = Reach::new(trials.batch.capture_row(trials.first + trial, size));
         let step = Step { k, gains: &policy.gains.rows, start: &start, end: &now, dim };

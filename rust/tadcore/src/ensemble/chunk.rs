@@ -6,6 +6,7 @@
 
 use super::between::Watch;
 use super::block::{BLOCK, Keys, Stop, Sweep};
+use super::fates::Played;
 use super::sweep::sweep_of;
 use super::trials::Trials;
 use super::{Batch, Between, End};
@@ -52,8 +53,15 @@ pub(super) struct Chunk<'a> {
 
 impl<'a> Chunk<'a> {
     /// The trials from `first` on at their initial positions.
-    pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize, width: Width) -> Self {
-        let trials = Trials::new(policy, batch, first, trials);
+    pub(super) fn new(
+        policy: &'a Policy,
+        batch: &'a Batch<'a>,
+        played: Option<&Played<'a>>,
+        first: usize,
+        trials: usize,
+        width: Width,
+    ) -> Self {
+        let trials = Trials::new(policy, batch, played, first, trials, width);
         Self { sweep: sweep_of(&trials.shape), trials, width }
     }
 
@@ -73,6 +81,7 @@ impl<'a> Chunk<'a> {
             cancel.check()?;
             w.missing.clear();
             w.waiting.clear();
+            self.trials.fail(k);
             if let Some(watch) = &mut watch {
                 watch.note(&self.trials);
             }
@@ -87,6 +96,7 @@ impl<'a> Chunk<'a> {
                 misses += w.filler.fill(self.trials.policy, k, &w.missing, &mut w.local, cancel)?;
                 self.follow(k, w)?;
             }
+            self.trials.shake(k);
             if let Some(watch) = &mut watch {
                 watch.look(&mut self.trials, k, ends, cancel)?;
             }

@@ -11,10 +11,13 @@
 //! | X(0) | [`Batch::positions`] | initial positions |
 //! | ζ, σ | [`Batch::visibility`], [`Batch::capture`] | radii |
 //! | max ‖z_i‖ | [`End::diverged`] | whether a trial diverges: [`crate::simulation::divergence`] |
+//! | mask, relay, ς | [`Chances`] | what fails, who is told, who is shaken: the draws of a recorded run |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
 mod between;
 mod chunk;
+mod fates;
+mod noise;
 mod trials;
 
 use std::thread::available_parallelism;
@@ -26,8 +29,9 @@ use crate::error::RunError;
 use crate::memory;
 use crate::policy::{Policy, step_table};
 use crate::simd::Width;
-use crate::simulation::{Outcome, Record, Setup, Termination};
+use crate::simulation::{Chances, Outcome, Record, Setup, Termination};
 use chunk::{Chunk, Worker};
+use fates::Played;
 use tadcore_kernels::ensemble::{block, sweep};
 
 /// Trials of one chunk at most.
@@ -133,22 +137,28 @@ fn row(all: &[f64], width: usize, i: usize) -> &[f64] {
 /// # Errors
 /// [`RunError`] for the first row that breaks a rule, before anything is played, or when the caller cancelled.
 pub fn run(policy: &Policy, batch: &Batch, threads: Option<usize>, cancel: &CancelToken) -> Result<Vec<End>, RunError> {
-    run_with(policy, batch, Between::NOTHING, threads, cancel)
+    run_with(policy, batch, Between::NOTHING, None, threads, cancel)
 }
 
-/// The same, with more or less done between the instants.
+/// The same, with more or less done between the instants, and in a world: row i is the trial that is i after the first.
 ///
 /// # Errors
-/// As [`run`].
+/// As [`run`], and for a world that cannot be accepted.
 pub fn run_with(
     policy: &Policy,
     batch: &Batch,
     between: Between,
+    chances: Option<Chances>,
     threads: Option<usize>,
     cancel: &CancelToken,
 ) -> Result<Vec<End>, RunError> {
     let (n, m) = (policy.game().n(), policy.game().constrained());
     let trials = batch.len(n + 2);
+    if let Some(chances) = chances.filter(|_| between != Between::NOTHING) {
+        chances.world.refuse_between()?;
+    }
+    let conditions = chances.map(|chances| chances.conditions(policy.game(), trials as u64)).transpose()?;
+    let played = chances.zip(conditions.as_ref()).map(|(chances, conditions)| Played { chances, conditions });
     for i in 0..trials {
         if i % CHECKED == 0 {
             cancel.check()?;
@@ -162,7 +172,7 @@ pub fn run_with(
     let threads = threads.min(trials.div_ceil(block::BLOCK)).max(1);
     // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
     memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
-    play(policy, batch, between, threads, Width::in_use(), &mut ends, cancel)?;
+    play(policy, batch, played.as_ref(), between, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
 }
 
@@ -172,9 +182,11 @@ fn most_trials(size: usize) -> usize {
 }
 
 /// Plays checked trials in chunks.
+#[allow(clippy::too_many_arguments, reason = "what is played, how, and where the ends go")]
 fn play(
     policy: &Policy,
     batch: &Batch,
+    played: Option<&Played>,
     between: Between,
     threads: usize,
     width: Width,
@@ -187,7 +199,7 @@ fn play(
     let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
     let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
     let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
-        Chunk::new(policy, batch, c * size, ends.len(), width).play(between, ends, worker, cancel)
+        Chunk::new(policy, batch, played, c * size, ends.len(), width).play(between, ends, worker, cancel)
     };
     if threads == 1 || ends.len() <= size {
         let mut worker = Worker::new(policy);
@@ -223,12 +235,62 @@ mod tests {
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![End::NOT_PLAYED; 50];
-                    play(&policy, &batch, Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
+                    play(&policy, &batch, None, Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
                     (ends, policy.save_transitions(&cancel).expect("memory"))
                 });
                 let played: Vec<_> = played.collect();
                 assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n}");
             }
+        }
+    }
+
+    /// The same in a world in which everything happens: failures, links, disturbances.
+    #[test]
+    fn widths_agree_to_the_bit_in_a_world() {
+        use crate::network::Frame;
+        use crate::random::Begin;
+        use crate::simulation::{Communication, World};
+        let cancel = CancelToken::new();
+        for (interaction, n, dim) in [
+            (Interaction::I1, 2, 2),
+            (Interaction::I1, 3, 3),
+            (Interaction::I2, 3, 2),
+            (Interaction::I1, 9, 2),
+            (Interaction::I1, 2, 4),
+        ] {
+            let trials = if n > 8 { 9 } else { 150 };
+            let game = bank::unit_game(interaction, vec![1.0; n], 1.2, 0.8, 1.0, 0.2, 0.005).expect("a valid game");
+            let m = game.constrained();
+            let world = World {
+                mean_time_to_failure: vec![0.3; m],
+                mean_time_to_repair: vec![0.1; m],
+                mean_time_detected: vec![0.2; m],
+                mean_time_missed: vec![0.02; m],
+                begin: vec![Begin::Stationary; m],
+                communication: Some(Communication {
+                    radius: (0..m).map(|i| (i > 0).then_some(1.5 + i as f64)).collect(),
+                    relays: Some(1),
+                    frame: Frame::Common,
+                    mean_time_up: vec![0.2; m],
+                    mean_time_down: vec![0.1; m],
+                    begin: Begin::Up,
+                }),
+                disturbance: (0..n + 2).map(|p| if p == 1 { 0.0 } else { 0.3 }).collect(),
+            };
+            let chances = Chances { world: &world, seed: 11, trial: (1 << 32) - 20 };
+            let conditions = chances.conditions(&game, trials as u64).expect("a valid world");
+            let (visibility, capture) = (vec![1.5; m], vec![0.1; n + 1]);
+            let positions: Vec<f64> = (0..trials * (n + 2) * dim).map(|i| 3.0 * (1.7 * i as f64).sin()).collect();
+            let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
+            let played = Width::all().into_iter().map(|width| {
+                let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
+                let mut ends = vec![End::NOT_PLAYED; trials];
+                let played = Played { chances, conditions: &conditions };
+                play(&policy, &batch, Some(&played), Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
+                (ends, policy.save_transitions(&cancel).expect("memory"))
+            });
+            let played: Vec<_> = played.collect();
+            assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n} {dim}");
         }
     }
 }

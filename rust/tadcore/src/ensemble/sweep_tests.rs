@@ -45,7 +45,9 @@ fn rims_belong_to_the_balls_at_every_size() {
             for width in Width::all() {
                 let (z, sight, capture) = (z.clone(), sight.clone(), capture.clone());
                 let far = vec![far];
-                let mut blocks = Blocks { z, sight, capture, far, sight_step: 0, capture_step: 0, live: BLOCK };
+                let network = None;
+                let mut blocks =
+                    Blocks { z, sight, capture, far, sight_step: 0, capture_step: 0, network, live: BLOCK };
                 let mut seen = vec![[0; BLOCK]];
                 let stop = sweep_of(&shape)(width, &shape, &mut blocks, 0, &StepTable::new(2, 3), None, &mut seen);
                 assert_eq!(stop, expected, "{width:?}");
@@ -81,6 +83,7 @@ fn blocks_stop_where_single_strips_do() {
         far: vec![[f64::INFINITY; BLOCK]; 40],
         sight_step: 0,
         capture_step: 0,
+        network: None,
         live: 40 * BLOCK - 3,
     };
     for width in Width::all() {

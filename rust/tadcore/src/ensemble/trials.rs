@@ -1,9 +1,11 @@
 //! The trials of a chunk: their states in blocks, which trial stands in which place, and how each ends.
 
 use super::block::{BLOCK, Blocks, PerTrial, Shape};
+use super::fates::{Fates, Played};
 use super::{Batch, End};
-use crate::network::squared_reach;
+use crate::network::{Topology, observe, squared_reach};
 use crate::policy::Policy;
+use crate::simd::Width;
 use crate::simulation::divergence::{self, within};
 use crate::simulation::{Outcome, Reach};
 
@@ -16,11 +18,20 @@ pub(super) struct Trials<'a> {
     pub(super) blocks: Blocks,
     /// Which trial of the chunk stands in each place.
     pub(super) who: Vec<u32>,
+    /// What a world does to them.
+    fates: Option<Fates<'a>>,
 }
 
 impl<'a> Trials<'a> {
     /// The trials from `first` on at their initial positions.
-    pub(super) fn new(policy: &'a Policy, batch: &'a Batch<'a>, first: usize, trials: usize) -> Self {
+    pub(super) fn new(
+        policy: &'a Policy,
+        batch: &'a Batch<'a>,
+        played: Option<&Played<'a>>,
+        first: usize,
+        trials: usize,
+        width: Width,
+    ) -> Self {
         let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
         let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
         let blocks = trials.div_ceil(BLOCK);
@@ -37,15 +48,46 @@ impl<'a> Trials<'a> {
         }
         let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
-        let who = (0..trials as u32).collect();
+        let who: Vec<u32> = (0..trials as u32).collect();
         let far = vec![[0.0; BLOCK]; blocks];
-        let blocks = Blocks { z, sight, capture, far, sight_step, capture_step, live: trials };
-        let mut of_chunk = Self { policy, batch, first, shape, blocks, who };
+        let mut blocks = Blocks { z, sight, capture, far, sight_step, capture_step, network: None, live: trials };
+        let fates = played.map(|played| Fates::new(played, first, &who, shape, width, &mut blocks));
+        let mut of_chunk = Self { policy, batch, first, shape, blocks, who, fates };
         for place in 0..of_chunk.blocks.far.len() * BLOCK {
             let scale = divergence::scale(&of_chunk.state(place), dim);
             of_chunk.blocks.far[place / BLOCK][place % BLOCK] = divergence::limit(scale);
         }
+        of_chunk.fill_up();
         of_chunk
+    }
+
+    /// Moves what fails on to t_k.
+    pub(super) fn fail(&mut self, k: usize) {
+        if let Some(fates) = &mut self.fates
+            && fates.fail(k, &self.who, &mut self.blocks)
+        {
+            self.fill_up();
+        }
+    }
+
+    /// Shakes every trial after its step from t_k.
+    pub(super) fn shake(&mut self, k: usize) {
+        if let Some(fates) = &mut self.fates {
+            fates.shake(k, &self.who, &mut self.blocks);
+        }
+    }
+
+    /// The network in force in one place, had the trial there the state `z`.
+    pub(super) fn network(&self, place: usize, z: &[f64]) -> Topology {
+        let sight: Vec<f64> = (0..self.shape.rows)
+            .map(|i| self.blocks.sight[place / BLOCK * self.blocks.sight_step + i][place % BLOCK])
+            .collect();
+        if let Some(fates) = &self.fates {
+            return fates.network(place, z, &sight, &self.blocks);
+        }
+        let mut network = Topology::empty(self.shape.rows, self.shape.size);
+        observe(z, self.shape.dim, &sight, &mut network);
+        network
     }
 
     /// The state of the trial in one place, row by row.
@@ -94,6 +136,9 @@ impl<'a> Trials<'a> {
         self.blocks.live -= 1;
         let last = self.blocks.live;
         self.who[place] = self.who[last];
+        if let Some(fates) = &mut self.fates {
+            fates.copy(last, place);
+        }
         self.blocks.copy(&self.shape, last, place);
     }
 

@@ -15,7 +15,7 @@ use crate::error::GameError;
 use crate::game::validation::rule;
 
 /// When an edge forms and breaks.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EdgeRule {
     /// h, a length.
     pub hysteresis: f64,

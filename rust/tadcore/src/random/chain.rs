@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn what_never_fails_takes_no_number() {
-        let none = |_| -> f64 { panic!("a number is drawn") };
+        let none = |_| -> f64 { unreachable!("a number is drawn") };
         for (up, down, begin) in [
             (f64::INFINITY, f64::INFINITY, Begin::Up),
             (f64::INFINITY, 0.1, Begin::Up),

@@ -5,6 +5,8 @@
 //! again, in plain loops that the compiler does side by side; the logarithm is the `libm` crate's, written out so that it
 //! can be among them, and bitwise equal to it.
 
+#![allow(clippy::excessive_precision, reason = "the digits as published")]
+
 /// A fraction of two polynomials of degree 7, highest power first.
 type Fraction = [[f64; 8]; 2];
 

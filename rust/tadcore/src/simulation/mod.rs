@@ -11,18 +11,23 @@
 //! The sampled-data reading of the paper: feedback and network are held between grid instants
 //! (zero-order hold), the motion is exact.
 
+mod course;
 pub(crate) mod crossing;
+mod disturbance;
 pub mod divergence;
 mod outcome;
 pub(crate) mod passes;
 mod record;
 mod setup;
 mod state;
+mod world;
 
+pub use course::{Course, Moment, Outside, State};
 pub use divergence::DIVERGED;
 pub use outcome::{Outcome, Reach};
 pub use passes::{Pass, Termination};
-pub use record::{Divergence, Record, simulate, simulate_with};
+pub use record::{Divergence, Record, Rules, simulate, simulate_with};
 pub use setup::Setup;
 pub(crate) use state::apply;
 pub use state::relative_state;
+pub use world::{Chances, Communication, Conditions, World};

@@ -1,10 +1,12 @@
 //! One game, everything recorded.
 
+use super::course::{Course, Moment, Outside, Present};
 use super::divergence;
 use super::outcome::{Outcome, Reach};
 use super::passes::{Pass, Step, Termination};
 use super::setup::Setup;
 use super::state::{apply, relative_state};
+use super::world::Chances;
 use crate::cancel::CancelToken;
 use crate::error::{RunError, Stopped};
 use crate::game::Grid;
@@ -66,6 +68,21 @@ pub struct Record {
     pub unconverged: usize,
     /// Rows whose gains are proved to be globally optimal.
     pub certified: usize,
+    /// What came between sight and network, in a world or under a network from outside.
+    pub course: Option<Course>,
+}
+
+/// What a run is given besides positions and radii; by default nothing, as in the paper.
+#[derive(Default)]
+pub struct Rules<'a> {
+    /// When edges form and break.
+    pub edges: EdgeRule,
+    /// When the game ends.
+    pub termination: Termination,
+    /// A world, and which of its trials.
+    pub chances: Option<Chances<'a>>,
+    /// A network from outside, in the place of what is seen.
+    pub outside: Option<Box<Outside<'a>>>,
 }
 
 /// Runs one game and records everything.
@@ -74,22 +91,26 @@ pub struct Record {
 /// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision without
 /// having diverged, or when the caller cancelled.
 pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
-    simulate_with(policy, setup, &EdgeRule::PAPER, Termination::Sampled, cancel)
+    simulate_with(policy, setup, Rules::default(), cancel)
 }
 
-/// The same with hysteresis and dwell time of the edges, unless `rule` is the paper's, and with its own kind of end.
+/// The same by other rules.
 ///
 /// # Errors
-/// [`RunError`] for positions, radii or a rule that cannot be accepted, or when the caller cancelled.
+/// [`RunError`] for positions, radii or rules that cannot be accepted, where a network from outside could not be given, or
+/// when the caller cancelled.
 pub fn simulate_with(
     policy: &Policy,
     setup: &Setup,
-    rule: &EdgeRule,
-    termination: Termination,
+    mut rules: Rules,
     cancel: &CancelToken,
 ) -> Result<Record, RunError> {
     setup.check(policy.game())?;
-    rule.check()?;
+    rules.edges.check()?;
+    if let (Some(chances), Termination::Continuous) = (&rules.chances, rules.termination) {
+        chances.world.refuse_between()?;
+    }
+    let mut present = rules.chances.map(|chances| Present::new(&chances, policy.game(), setup.dim)).transpose()?;
     spare(WHAT)?;
     let game = policy.game();
     let (n, size, m, dim) = (game.n(), game.size(), game.constrained(), setup.dim);
@@ -98,9 +119,11 @@ pub fn simulate_with(
     let mut z = Vec::with_capacity(size * dim);
     relative_state(setup.positions, dim, &mut z);
     let mut attacker = setup.positions[(n + 1) * dim..].to_vec();
+    // The network in force, what is seen of it, and the sight.
     let mut topology = Topology::empty(m, size);
-    let mut edges =
-        (*rule != EdgeRule::PAPER).then(|| EdgeState::new(rule, setup.visibility, size, game.grid().step()));
+    let (mut seen, mut within_sight) = (topology.clone(), topology.clone());
+    let mut edges = (rules.edges != EdgeRule::PAPER)
+        .then(|| EdgeState::new(&rules.edges, setup.visibility, size, game.grid().step()));
     let mut solver = Synthesizer::new();
     let mut record = Record {
         outcome: Outcome::Timeout,
@@ -119,6 +142,7 @@ pub fn simulate_with(
         iterations: 0,
         unconverged: 0,
         certified: 0,
+        course: (present.is_some() || rules.outside.is_some()).then(Course::default),
     };
     let last = game.grid().steps();
     let mut next = vec![0.0; size * dim];
@@ -139,13 +163,26 @@ pub fn simulate_with(
         let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
         if end.is_none() || k == 0 {
             match &mut edges {
-                None => observe(&z, dim, &sight, &mut topology),
-                Some(edges) => edges.observe(k, &z, dim, &sight, &mut topology),
+                None => observe(&z, dim, &sight, &mut within_sight),
+                Some(edges) => edges.observe(k, &z, dim, &sight, &mut within_sight),
+            }
+            seen.clone_from(&within_sight);
+            topology = match &mut present {
+                None => seen.clone(),
+                Some(present) => present.network(k, &z, &mut seen),
+            };
+            if let Some(outside) = &mut rules.outside {
+                let (time, positions) = (game.grid().time(k), positions(&z, &attacker, dim));
+                let given = outside(&Moment { step: k, time, positions: &positions, seen: &seen });
+                topology = given.ok_or(RunError::Network { time })?;
             }
         }
         let step = policy.at(k, &topology, &mut solver, cancel)?;
         if recording {
             record.push(policy, k, &z, &attacker, &topology, &step)?;
+            if let Some(course) = &mut record.course {
+                course.push(&seen, present.as_ref())?;
+            }
             recording = record.last_row_is_bounded(n + 2);
             if recording {
                 record.count(&step);
@@ -160,17 +197,21 @@ pub fn simulate_with(
             (record.outcome, record.end) = (outcome, k);
             break;
         }
-        let before = (termination == Termination::Continuous).then(|| attacker.clone());
+        let before = (rules.termination == Termination::Continuous).then(|| attacker.clone());
         advance(&step, &z, dim, &mut next, &mut attacker);
         let within = Step { k, gains: &step.gains.rows, start: &z, end: &next, dim };
         match before {
             None if record.diverged.is_some() => {} // a pass says nothing any more
+            None if present.as_ref().is_some_and(Present::shakes) => {}
             None => within.passes(policy, &reach, &mut record.passes, cancel)?,
             Some(from) => {
                 if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {
                     let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
                     if recording {
                         record.push(policy, k, &z, &attacker, &topology, &step)?;
+                        if let Some(course) = &mut record.course {
+                            course.push(&seen, present.as_ref())?;
+                        }
                         record.certified += usize::from(step.gains.certified);
                         record.steps = k + 1;
                     }
@@ -180,11 +221,23 @@ pub fn simulate_with(
             }
         }
         std::mem::swap(&mut z, &mut next);
+        if let Some(present) = &mut present {
+            let added = present.shake(k, &mut z, &mut attacker);
+            if let (true, Some(course)) = (recording, &mut record.course) {
+                course.note(added);
+            }
+        }
     }
     if let Some(diverged) = &mut record.diverged {
         diverged.size = (most / scale).sqrt();
     }
     Ok(record)
+}
+
+/// X from z and X_a.
+fn positions(z: &[f64], attacker: &[f64], dim: usize) -> Vec<f64> {
+    let players = z.chunks_exact(dim).flat_map(|row| row.iter().zip(attacker).map(|(x, a)| x + a));
+    players.chain(attacker.iter().copied()).collect()
 }
 
 /// z ← exp(Cδ) z, and the attacker by its own row.
@@ -233,14 +286,18 @@ impl Record {
         self.gains.truncate(self.gains.len() - gains);
         self.networks.pop();
         self.theta.pop();
+        if let Some(course) = &mut self.course {
+            course.pop(row);
+        }
     }
 
     /// Bytes that `rows` rows of a game take.
-    fn bytes(policy: &Policy, rows: usize, dim: usize) -> u128 {
+    fn bytes(&self, policy: &Policy, rows: usize, dim: usize) -> u128 {
         let game = policy.game();
         let (n, m) = (game.size() as u128, game.constrained() as u128);
         let numbers = 2 * (n + 1) * dim as u128 + m * n + 5;
-        rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128)
+        let course = if self.course.is_some() { Course::bytes(game, dim) } else { 0 };
+        rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128 + course)
     }
 
     fn push(
@@ -253,7 +310,7 @@ impl Record {
         step: &StepPolicy,
     ) -> Result<(), Stopped> {
         let dim = self.dim;
-        within(WHAT, Self::bytes(policy, k + 1, dim), MOST_BYTES)?;
+        within(WHAT, self.bytes(policy, k + 1, dim), MOST_BYTES)?;
         if k.is_multiple_of(64) {
             spare(WHAT)?;
         }
@@ -264,10 +321,7 @@ impl Record {
             reserve(WHAT, list, 4)?;
         }
         reserve(WHAT, &mut self.networks, 1)?;
-        for row in z.chunks_exact(dim) {
-            self.positions.extend(row.iter().zip(attacker).map(|(x, a)| x + a));
-        }
-        self.positions.extend_from_slice(attacker);
+        self.positions.extend(positions(z, attacker, dim));
         let FreeRows { attacker: h, target } = policy.free_rows(k);
         let mut velocity = vec![0.0; dim];
         let gains = step.gains.rows.chunks_exact(network.size());
