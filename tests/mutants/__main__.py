@@ -30,7 +30,17 @@ ROOT = Path(__file__).resolve().parents[2]
 CRATES = {"tadcore": Path("rust/tadcore/src"), "tadcore_kernels": Path("rust/tadcore-kernels/src")}
 # In this order, but for a room's own tests, in the library and beside it, which are first. Properties draw games from a
 # fixed seed.
-TESTS = ["synthesis", "global_minimum", "tadcore_kernels", "tadcore", "paper", "ensemble", "properties", "riccati"]
+TESTS = [
+    "synthesis",
+    "global_minimum",
+    "tadcore_kernels",
+    "tadcore",
+    "paper",
+    "ensemble",
+    "worlds",
+    "properties",
+    "riccati",
+]
 ENVIRONMENT = {"PROPTEST_CASES": "24", "PROPTEST_RNG_SEED": "20250117"}
 # Seconds of the processor after which a test program hangs, as a multiple of its time without a mutant and at least; a
 # busy machine changes nothing in them. On the clock, for what sleeps for ever, so many times as long.

@@ -8,8 +8,10 @@ import of_newton
 import of_riccati
 import of_simd
 import of_synthesis
+import of_worlds
 
-MUTANTS = of_simd.MUTANTS | of_riccati.MUTANTS | of_newton.MUTANTS | of_synthesis.MUTANTS | of_games.MUTANTS
+ALL = [of_simd, of_riccati, of_newton, of_synthesis, of_games, of_worlds]
+MUTANTS = {file: mutants for part in ALL for file, mutants in part.MUTANTS.items()}
 
 # Mutants that no test can tell from the program: (file, formula): why.
 EQUIVALENT = {
