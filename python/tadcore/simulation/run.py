@@ -308,7 +308,8 @@ def simulate(
     continuous = ending == "continuous"
     sc = as_scenario(sc)
     game, sight, reach = game_of(sc), sc.visibility_radii, sc.capture_radii
-    record = game.simulate(sc.positions, sight, reach, **rule, continuous=continuous)
+    band, rest = rule["hysteresis"], rule["dwell"]
+    record = game.simulate(sc.positions, sight, reach, hysteresis=band, dwell=rest, continuous=continuous)
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
         scenario=sc,

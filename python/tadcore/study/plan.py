@@ -196,9 +196,9 @@ class Plan:
         """Play the trials that have these inputs; the core refuses what is no game, and ends when ``stop`` is set."""
         setup = setups(self.scenario, self.quantities, inputs)
         starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
-        between: dict[str, bool] = {"continuous": self.termination == "continuous", "passes": self.passes}
+        continuous = self.termination == "continuous"
         kind, defender, time, diverged, passed = self.game.simulate_batch(
-            starts, sight, capture, **between, threads=threads, stop=stop
+            starts, sight, capture, continuous=continuous, passes=self.passes, threads=threads, stop=stop
         )
         return Outcomes(kind, defender, time, diverged, inputs, passed if self.passes else None)
 
