@@ -97,11 +97,15 @@ def test_the_instant_does_not_depend_on_units_place_or_direction():
         assert tadcore.simulate(other).diverged.time == base.time
 
 
-def test_a_start_far_from_everything_but_the_attacker_sets_the_scale():
-    """The scale is the largest distance between any two players, whoever they are."""
-    sc = unstable()
-    run = tadcore.simulate(sc.replace({"d1.position": (5e4, 0.0)}))
-    assert run.diverged is None or sizes(run.position).max() > SIZE
+@pytest.mark.parametrize(
+    "places", [{"d1": (5e4, 0.0)}, {"d1": (50.0, 0.0), "target": (-50.0, 0.0)}, {"d1": (0.0, 7.0), "d2": (0.0, -7.0)}]
+)
+def test_the_largest_distance_between_any_two_sets_the_scale(places):
+    """Whoever they are: the attacker is between the two, or is one of them."""
+    run = tadcore.simulate(unstable(**{f"{player}.position": place for player, place in places.items()}))
+    size = sizes(run.position)
+    assert run.diverged.time == run.times[np.argmax(size > SIZE)]
+    assert run.diverged.size == pytest.approx(size.max(), rel=1e-12)
 
 
 def test_a_run_that_diverged_says_so_wherever_it_speaks(tmp_path):

@@ -285,7 +285,7 @@ def test_a_density_estimate_is_a_sampler():
     rng = np.random.default_rng(1)
     seen = rng.normal([-1.0, 1.0], [0.2, 0.4], (400, 2))
     study = Study(SC, vary={"attacker.position": stats.gaussian_kde(seen.T)}, trials=20_000, seed=3)
-    drawn = np.stack(list(study.draws().values()) if hasattr(study, "draws") else list(study.run().inputs.values()))
+    drawn = np.stack(list(study.inputs().values()))
     np.testing.assert_allclose(drawn.mean(axis=1), seen.mean(axis=0), atol=0.02)
     covariance = np.cov(seen.T) + stats.gaussian_kde(seen.T).covariance  # of an estimate: what was seen, and its kernel
     np.testing.assert_allclose(np.cov(drawn), covariance, atol=0.01)
