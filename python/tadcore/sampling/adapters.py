@@ -39,7 +39,11 @@ class Quantiles(Sampler):
 
     def check(self, field: str, components: int) -> None:
         """Refuse parameters with another number of coordinates."""
-        low = np.shape(self.distribution.support()[0])
+        try:
+            low = np.shape(self.distribution.support()[0])
+            self.bounds()
+        except (TypeError, ValueError, LookupError) as error:
+            raise ScenarioError(field, self.distribution, "a distribution whose support() is two numbers") from error
         if low not in ((), (1,), (components,)):
             what = "numbers" if components == 1 else f"numbers, or lists of {components}"
             raise ScenarioError(field, self.distribution, f"a distribution whose parameters are {what}")
@@ -47,8 +51,7 @@ class Quantiles(Sampler):
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """The quantiles of the points."""
         quantiles = getattr(self.distribution, "ppf", None) or self.distribution.icdf
-        values = np.asarray(quantiles(block.points), dtype=np.float64)
-        return np.ascontiguousarray(np.broadcast_to(values, (len(block.points), components)))
+        return _shaped(repr(self)[1:-1], quantiles(block.points), len(block.points), components, broadcast=True)
 
     def bounds(self) -> tuple[float, float]:
         """The support."""
@@ -279,8 +282,8 @@ def _named(field: str, make: Callable[[], Sampler]) -> Sampler:
         raise ScenarioError(f"{field}, {error.field}", error.value, error.rule) from None
 
 
-def _shaped(name: str, values: Any, size: int, components: int) -> NDArray[np.float64]:
-    """Check what a callable returned."""
+def _shaped(name: str, values: Any, size: int, components: int, *, broadcast: bool = False) -> NDArray[np.float64]:
+    """Check what a callable returned; with ``broadcast`` one number may stand for a column, or for all."""
     rule = f"an array of numbers of shape {(size, components)}, one row for each trial"
     field = f"what {name} returns"
     try:
@@ -289,6 +292,8 @@ def _shaped(name: str, values: Any, size: int, components: int) -> NDArray[np.fl
         found = error.value if isinstance(error.value, str) else f"a {type(values).__name__} that is no array"
         raise ScenarioError(field, found, rule) from None
     wanted = {(size, components), (size,)} if components == 1 else {(size, components)}
+    if broadcast and array.shape in {(), (1,), (1, 1), (size, 1), (1, components), (components,)} - wanted:
+        array = np.broadcast_to(array, (size, components))
     if array.dtype.kind not in "iuf" or array.shape not in wanted:
         raise ScenarioError(field, f"{array.dtype} of shape {array.shape}", rule)
     # A copy: the next draw may be written where this one was.

@@ -281,6 +281,55 @@ def test_what_is_no_sampler_is_refused(given):
         Study(SC, vary={"attacker.position": given}, trials=5)
 
 
+class Own:
+    """A distribution that writes every draw where the one before was."""
+
+    def support(self):
+        return 1.0, 2.0
+
+    def __init__(self, change=lambda values: values):
+        self.change, self.buffer = change, np.empty((8192, 1))
+
+    def ppf(self, points):
+        buffer = self.buffer[: len(points)]
+        buffer[...] = 1.0 + points
+        return self.change(buffer)
+
+
+def test_quantiles_of_a_distribution_that_reuses_its_memory_are_kept_apart():
+    own = Own()
+    drawn = Study(SC, vary={"d1.visibility_radius": own, "d2.visibility_radius": own}, trials=50).inputs()
+    apart = Study(SC, vary={"d1.visibility_radius": Own(), "d2.visibility_radius": Own()}, trials=50).inputs()
+    for name, values in apart.items():
+        np.testing.assert_array_equal(drawn[name], values)
+    first, second = drawn.values()
+    assert not np.any(first == second)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda values: np.ma.masked_less(values, 1.5),
+        lambda values: values.astype(str),
+        lambda values: values > 1.5,
+        lambda values: [[1.0], [2.0, 3.0]],
+        lambda values: np.ones(3),
+        lambda values: None,
+    ],
+)
+def test_quantiles_that_are_no_numbers_are_refused_by_name(change):
+    with pytest.raises(ScenarioError, match=r"^what .*Own returns: got .*, must be an array of numbers"):
+        Study(SC, vary={"d1.visibility_radius": Own(change)}, trials=5).run()
+
+
+@pytest.mark.parametrize("support", [None, 5.0, (), (1.0,), ("a", "b"), ([1.0], [2.0, 3.0], 4.0)])
+def test_a_support_that_is_none_is_refused_by_name(support):
+    own = Own()
+    own.support = lambda: support
+    with pytest.raises(ScenarioError, match=r"^vary\[.*support\(\) is two numbers"):
+        Study(SC, vary={"d1.visibility_radius": own}, trials=5)
+
+
 def test_a_density_estimate_is_a_sampler():
     rng = np.random.default_rng(1)
     seen = rng.normal([-1.0, 1.0], [0.2, 0.4], (400, 2))
