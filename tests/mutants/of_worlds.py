@@ -18,7 +18,7 @@ MUTANTS = {
         ("normal: far tail", "(&FAR, «root - 5.0»)", "root - 1.6"),
         ("normal: which tail", "libm::log(if «q < 0.0» {", "q > 0.0"),
         ("normal: sign", "if «q < 0.0» { -size }", "q > 0.0"),
-        ("normal, many: which are tails", "usize::from(«(u - 0.5).abs() > MIDDLE»)", "u - 0.5 > MIDDLE"),
+        ("normal, many: which tail", "tails[count] = if «u < 0.5»", "u > 0.5"),
         ("normal, many: near tail", "let r = «*root - 1.6»", "*root + 1.6"),
         ("normal, many: far tails", "if «largest <= 5.0»", "largest <= 50.0"),
         ("ln: halves", "s * («half + (odd + even)»)", "half - (odd + even)"),
@@ -40,7 +40,7 @@ MUTANTS = {
     "network/relay.rs": [
         ("links: closed ball", "if «d2 <= self.reach[j]»", "d2 < self.reach[j]"),
         ("links: who sends nothing", "rho.map_or(«-1.0», squared_reach)", "f64::INFINITY"),
-        ("relay: the attacker in a star", "star.add(«n»);", "n - 1"),
+        ("relay: the attacker in a star", "stars[i].add(«n»);", "n - 1"),
         ("relay: only what meets", "if «stars[j].meets(&component)»", "true"),
         ("relay: common frame", "if «self.frame == Frame::Common»", "self.frame == Frame::Relative"),
         ("relay: how many relays", "for _ in «0..self.relays»", "0..self.relays + 1"),

@@ -6,8 +6,8 @@
 //! | L | [`Relay::up`], [`Relay::new`] | bit i·m + j: i hears j, if the link is up and they are near enough |
 //! | relay | [`Rule`] | who is told what, from what is seen and who hears whom |
 //!
-//! Networks change seldom: what a trial was told last is kept beside what it was told from, and asked for anew only where
-//! that differs.
+//! What small teams are told is looked up, by a table that fills as it is asked. In larger ones, what a trial was told
+//! last is kept beside what it was told from, and asked for anew only where that differs.
 
 use super::block::{BLOCK, PerTrial, Shape};
 use super::sweep::distance;
@@ -15,6 +15,11 @@ use crate::simd::{Number, Simd, Width, dispatch};
 
 /// One word of each trial.
 pub type Words = [u64; BLOCK];
+
+/// Bits of what is seen and of who hears whom, up to which what is told is looked up: 4 MiB, of which little is touched.
+const TABLE_BITS: usize = 21;
+/// Marks an entry of that table; the bits below it are what is told.
+const KNOWN: u16 = 1 << 15;
 
 /// Who is told what: a function of the words of what is seen and of who hears whom.
 pub trait Rule: Send {
@@ -43,6 +48,8 @@ pub struct Relay {
     last: Vec<Words>,
     heard: Vec<Words>,
     scratch: [Vec<u64>; 3],
+    /// By who hears whom and what is seen: what is told; empty in larger teams.
+    table: Vec<u16>,
 }
 
 impl Relay {
@@ -55,11 +62,14 @@ impl Relay {
     pub fn new(shape: &Shape, reach: &[f64], blocks: usize, up: Vec<Words>, rule: Box<dyn Rule>) -> Self {
         let links = Self::words(shape.rows);
         let everywhere = reach.iter().all(|&reach| reach == f64::INFINITY);
+        let (bits, all) = (shape.rows * shape.size, shape.rows * (shape.rows + shape.size));
+        let small = all <= TABLE_BITS && bits < KNOWN.trailing_zeros() as usize;
+        let table = if small { vec![0; 1 << all] } else { Vec::new() };
         // Nobody hears itself, so this was never asked for.
-        let last = vec![[u64::MAX; BLOCK]; blocks * (2 * shape.words + links)];
+        let last = vec![[u64::MAX; BLOCK]; if small { 0 } else { blocks * (2 * shape.words + links) }];
         let scratch = [vec![0; shape.words], vec![0; links], vec![0; shape.words]];
         let reach = if everywhere { Vec::new() } else { reach.to_vec() };
-        Self { rule, reach, up, last, heard: vec![[0; BLOCK]; links], scratch }
+        Self { rule, reach, up, last, heard: vec![[0; BLOCK]; links], scratch, table }
     }
 
     /// Writes who hears whom in one block.
@@ -107,7 +117,29 @@ impl Relay {
         }
     }
 
-    /// Replaces what is seen by what is told.
+    /// Replaces what is seen by what is told, by the table.
+    #[inline(always)]
+    fn look_up(&mut self, bits: usize, keys: &mut Words) {
+        let (heard, last) = (&self.heard[0], self.table.len() - 1);
+        let (mut told, mut known) = ([0; BLOCK], KNOWN);
+        for l in 0..BLOCK {
+            // The mask changes nothing; it tells the compiler that the index lies within the table.
+            let entry = self.table[(heard[l] << bits | keys[l]) as usize & last];
+            told[l] = u64::from(entry & !KNOWN);
+            known &= entry;
+        }
+        if known == 0 {
+            for l in 0..BLOCK {
+                let mut word = [0];
+                self.rule.told(&[keys[l]], &[heard[l]], &mut word);
+                told[l] = word[0];
+                self.table[(heard[l] << bits | keys[l]) as usize & last] = KNOWN | word[0] as u16;
+            }
+        }
+        *keys = told;
+    }
+
+    /// The same for any team.
     #[inline(always)]
     fn tell(&mut self, words: usize, block: usize, keys: &mut [Words]) {
         let links = self.heard.len();
@@ -175,7 +207,11 @@ dispatch! {
         }
         if let Some(relay) = &mut network.relay {
             relay.hear::<V, D>(&network.shape, block, z);
-            relay.tell(words, block, keys);
+            if relay.table.is_empty() {
+                relay.tell(words, block, keys);
+            } else {
+                relay.look_up(network.shape.rows * network.shape.size, &mut keys[0]);
+            }
         }
     }
 }

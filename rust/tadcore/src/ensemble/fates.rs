@@ -26,6 +26,8 @@ pub(super) struct Fates<'a> {
     /// How many trials of the batch come before the chunk.
     first: u64,
     shape: Shape,
+    /// Edges and links, all up.
+    all_up: (Topology, Topology),
     /// The chains of each trial.
     walks: Vec<Walk>,
     /// The step of the next flip in each place.
@@ -48,12 +50,6 @@ impl Rule for Told {
     }
 }
 
-/// Everything up: m × N edges, and m × m links but those to oneself.
-fn all_up(shape: &Shape) -> (Topology, Topology) {
-    let edges = Topology::complete(shape.rows, shape.size);
-    (edges, Topology::from_fn(shape.rows, shape.rows, |i, j| i != j))
-}
-
 impl<'a> Fates<'a> {
     /// Of the trials from `first` on, at step 0; gives the blocks what comes between sight and network.
     pub(super) fn new(
@@ -70,7 +66,8 @@ impl<'a> Fates<'a> {
         let words = |all: &Topology| -> Vec<Words> {
             (0..count).flat_map(|_| all.words().iter().map(|&word| [word; BLOCK]).collect::<Vec<_>>()).collect()
         };
-        let (edges, links) = all_up(&shape);
+        let edges = Topology::complete(shape.rows, shape.size);
+        let links = Topology::from_fn(shape.rows, shape.rows, |i, j| i != j);
         let relay = conditions.links.as_ref().map(|talk| {
             let rule = Box::new(Told { links: talk.clone(), rows: shape.rows, size: shape.size });
             Relay::new(&shape, talk.reach(), count, words(&links), rule)
@@ -82,6 +79,7 @@ impl<'a> Fates<'a> {
             chances,
             first: first as u64,
             shape,
+            all_up: (edges, links),
             walks: vec![Walk::default(); who.len() * failures.len()],
             due: vec![NEVER; count * BLOCK],
             noise: conditions.spread.as_ref().map(|spread| Noise::new(spread, shape, chances.seed, width)),
@@ -128,7 +126,7 @@ impl<'a> Fates<'a> {
     /// Writes what is up for a trial beside its state.
     fn write(&mut self, place: usize, trial: u32, blocks: &mut Blocks) {
         let Some(network) = blocks.network.as_mut().filter(|_| !self.conditions.failures.is_empty()) else { return };
-        let (mut edges, mut links) = all_up(&self.shape);
+        let (mut edges, mut links) = self.all_up.clone();
         let failures = &self.conditions.failures;
         let chains = failures.len();
         failures.mask(&self.walks[trial as usize * chains..][..chains], &mut edges, &mut links);

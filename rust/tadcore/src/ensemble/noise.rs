@@ -61,7 +61,7 @@ dispatch! {
                 let (mut a, mut b) = ([0.0; TILE], [0.0; TILE]);
                 uniforms_of([k, p as u32], &last, noise.key, &mut a, &mut b);
                 for (axis, numbers) in axes.iter_mut().zip([&mut a, &mut b]) {
-                    normals(numbers);
+                    normals::<V, _>(numbers);
                     for t in 0..TILE {
                         axis[t] = s * numbers[t];
                     }

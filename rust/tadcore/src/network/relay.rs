@@ -66,24 +66,27 @@ impl Links {
     /// 𝒜 from what is seen (m × N) and who hears whom (m × m).
     #[must_use]
     pub fn told(&self, seen: &Topology, heard: &Topology) -> Topology {
-        // A player more than players, for the attacker.
-        if seen.size() < 64 { self.told_by::<u64>(seen, heard) } else { self.told_by::<Vec<u64>>(seen, heard) }
+        // A node more than players, for the attacker.
+        if seen.size() < 64 {
+            self.told_by(seen, heard, &mut [[0_u64; 64]; 2].each_mut().map(|list| &mut list[..]))
+        } else {
+            let mut lists = [vec![Vec::new(); seen.rows()], vec![Vec::new(); seen.rows()]];
+            self.told_by(seen, heard, &mut lists.each_mut().map(|list| &mut list[..]))
+        }
     }
 
-    fn told_by<S: Set>(&self, seen: &Topology, heard: &Topology) -> Topology {
+    /// The same by sets of one kind; room for two of each player.
+    fn told_by<S: Set>(&self, seen: &Topology, heard: &Topology, [stars, direct]: &mut [&mut [S]; 2]) -> Topology {
         let (m, n) = (seen.rows(), seen.size());
-        // Each player with what it sees; the attacker is node N.
-        let stars: Vec<S> = (0..m)
-            .map(|i| {
-                let mut star = S::row(seen, i, n + 1);
-                if star.has(i) {
-                    star.add(n);
-                }
-                star.add(i);
-                star
-            })
-            .collect();
-        let direct: Vec<S> = (0..m).map(|i| S::row(heard, i, m)).collect();
+        for i in 0..m {
+            // What a player sees, and itself; the attacker is node N.
+            stars[i] = S::row(seen, i, n + 1);
+            if stars[i].has(i) {
+                stars[i].add(n);
+            }
+            stars[i].add(i);
+            direct[i] = S::row(heard, i, m);
+        }
         let mut told = Topology::empty(m, n);
         for i in 0..m {
             let mut speakers = direct[i].clone();
@@ -96,10 +99,9 @@ impl Links {
                 }
                 speakers = further;
             }
-            let mut component = S::row(&told, i, n + 1);
-            component.add(i);
+            let mut component = stars[i].clone();
             if self.frame == Frame::Common {
-                component.join(&speakers);
+                (0..m).filter(|&j| speakers.has(j)).for_each(|j| component.add(j));
             }
             loop {
                 let before = component.clone();

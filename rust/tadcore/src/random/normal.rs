@@ -7,6 +7,8 @@
 
 #![allow(clippy::excessive_precision, reason = "the digits as published")]
 
+use crate::simd::{Number, Simd};
+
 /// A fraction of two polynomials of degree 7, highest power first.
 type Fraction = [[f64; 8]; 2];
 
@@ -144,18 +146,22 @@ fn ln(p: f64) -> f64 {
     s * (half + (odd + even)) + k * LN2[1] - half + f + k * LN2[0]
 }
 
-/// [`normal`] of every number.
+/// [`normal`] of every number, eight at a time.
 #[inline(always)]
-pub fn normals<const T: usize>(numbers: &mut [f64; T]) {
+pub fn normals<V: Simd, const T: usize>(numbers: &mut [f64; T]) {
     // Which lie in the tails, their p, and then √(−ln p) and the size.
     let (mut which, mut count) = ([0; T], 0);
     let mut tails = [0.25; T];
-    for (t, &u) in numbers.iter().enumerate() {
-        which[count] = t as u32;
-        tails[count] = u.min(1.0 - u);
-        count += usize::from((u - 0.5).abs() > MIDDLE);
-        if count == T {
-            break;
+    for (group, eight) in numbers.chunks_exact(8).enumerate() {
+        let q = V::Eight::load(eight) - V::Eight::splat(0.5);
+        let mut outside = V::Eight::bits(V::Eight::splat(MIDDLE).less(q.abs()));
+        while outside != 0 {
+            let t = outside.trailing_zeros() as usize;
+            let u = eight[t];
+            which[count] = (8 * group + t) as u32;
+            tails[count] = if u < 0.5 { u } else { 1.0 - u };
+            count += 1;
+            outside &= outside - 1;
         }
     }
     for x in &mut *numbers {
@@ -190,6 +196,7 @@ pub fn normals<const T: usize>(numbers: &mut [f64; T]) {
 mod tests {
     use super::*;
     use crate::random::uniform;
+    use crate::simd::Baseline;
 
     /// Bits without a pattern, with short runs of zeros and ones at the top, so that tails are met.
     fn bits(i: u64) -> u64 {
@@ -224,7 +231,7 @@ mod tests {
         for first in (0..1_000_000).step_by(128) {
             let numbers: [f64; 128] = std::array::from_fn(|t| uniform(bits(first + t as u64)));
             let mut all = numbers;
-            normals(&mut all);
+            normals::<Baseline, _>(&mut all);
             for (x, u) in all.into_iter().zip(numbers) {
                 assert!(x.to_bits() == normal(u).to_bits(), "{u}: {x}");
             }
@@ -234,7 +241,7 @@ mod tests {
             for last in [0.5, 0.001, 1e-14] {
                 let mut all = [fill; 16];
                 all[15] = last;
-                normals(&mut all);
+                normals::<Baseline, _>(&mut all);
                 assert_eq!(all[..15], [normal(fill); 15]);
                 assert_eq!(all[15], normal(last));
             }
