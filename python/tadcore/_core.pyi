@@ -6,7 +6,19 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Gains", "Game", "Record", "Stop", "World", "__version__", "grid_times", "observe", "simd"]
+__all__ = [
+    "Equilibrium",
+    "Gains",
+    "Game",
+    "Record",
+    "Stop",
+    "World",
+    "__version__",
+    "grid_times",
+    "observe",
+    "simd",
+    "simulate_games",
+]
 
 __version__: str
 
@@ -244,3 +256,28 @@ class Record:
 
 def observe(positions: NDArray[np.float64], visibility_radii: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Who sees whom at positions (n + 2, dim): 𝒜, shape (m, N), as a run sees it."""
+
+def simulate_games(
+    interaction: Literal["I1", "I2"],
+    numbers: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    visibility_radii: NDArray[np.float64],
+    capture_radii: NDArray[np.float64],
+    *,
+    continuous: bool = False,
+    passes: bool = False,
+    threads: int | None = None,
+    stop: Stop | None = None,
+) -> tuple[
+    NDArray[np.int8],
+    NDArray[np.int32],
+    NDArray[np.float64],
+    NDArray[np.int64],
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+]:
+    """Trials with a game each: kind (3: no equilibrium), defender, time, grid index, diverged, passed.
+
+    Each row of numbers: horizon, step, r_τ, r_a, q_aτ, f_aτ, q_τa, f_τa, λ; of all defenders r_d, q_ad, f_ad, q_da,
+    f_da; then γ. What does not belong to the interaction is not read.
+    """

@@ -36,8 +36,25 @@ RADIUS = Rule("a positive number, or inf for unlimited sight", lambda v: v > 0.0
 WEIGHT = Rule("a weight between 1e-30 and 1e30", lambda v: (v >= LIGHTEST) & (v <= HEAVIEST))
 FRACTION = Rule("a number in [0, 1]", lambda v: (v >= 0.0) & (v <= 1.0))
 
-OF_FIELD = {"position": (FINITE, COORDINATE), "visibility_radius": (RADIUS,), "capture_radius": (POSITIVE,)}
-"""The rules of what may vary within one game."""
+OF_FIELD = {
+    "position": (FINITE, COORDINATE),
+    "visibility_radius": (RADIUS,),
+    "capture_radius": (POSITIVE,),
+    "weight": (WEIGHT,),
+    "fraction": (FRACTION,),
+    "synthesis_weights": (FRACTION,),
+    "horizon": (POSITIVE,),
+    "step": (POSITIVE,),
+}
+"""The rules of what may vary from trial to trial, within one game and between games."""
+
+_DIVIDES = 1e-9
+
+
+def divides(horizon: Any, step: Any) -> Any:
+    """Whether δ goes into T a whole number of times, up to rounding."""
+    ratio = horizon / step
+    return (abs(ratio - ratio.round()) <= _DIVIDES * ratio) & (ratio > 0.5) & (ratio <= 1e9)
 
 
 def can_be_told(sight: Any, extent: Any) -> Any:

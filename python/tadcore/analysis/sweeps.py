@@ -19,19 +19,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore._shared.html import as_html, line, thinned
 from tadcore._shared.shares import estimate, percent
 from tadcore.errors import NoEquilibriumError, ScenarioError
-from tadcore.game.outcome import DIVERGED, OutcomeKind
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, UNPLAYED, OutcomeKind
 from tadcore.scenario.paths import expand, normal, short
 from tadcore.statistics.intervals import ends
+from tadcore.statistics.outcomes import KINDS
 from tadcore.study.collect import StoppingRule
 from tadcore.study.study import Study, StudyResult
 
 if TYPE_CHECKING:
     import xarray
 
+_ENDS = (*KINDS, DIVERGED, NO_EQUILIBRIUM)  # as `Tally.kinds` counts them
 _LEVEL = 0.95
 
 
@@ -104,9 +107,11 @@ class SweepResult:
 
         from tadcore.scenario.provenance import provenance
 
-        lost = any(cell.result is not None and cell.result.diverged.any() for cell in self.cells)
-        names = [*(kind.name.lower() for kind in OutcomeKind), *([DIVERGED] if lost else [])]
-        rows = [_summary(cell.result, len(names)) for cell in self.cells]
+        played = [cell.result.tally.kinds() for cell in self.cells if cell.result is not None]
+        there = np.sum(played, axis=0) if played else np.zeros(len(_ENDS), dtype=np.int64)
+        shown = [i for i in range(len(_ENDS)) if i < len(OutcomeKind) or there[i]]
+        names = [_ENDS[i] for i in shown]
+        rows = [_summary(cell.result, shown) for cell in self.cells]
 
         def over(values: Sequence[Any]) -> Any:
             array = np.array(values)
@@ -157,7 +162,7 @@ class SweepResult:
     def __repr__(self) -> str:
         size = " × ".join(f"{path} ({len(values)})" for path, values in self.grid.items())
         without = sum(cell.result is None for cell in self.cells)
-        lost = sum(int(cell.result.diverged.sum()) for cell in self.cells if cell.result is not None)
+        lost = sum(int(cell.result.tally.kinds()[len(OutcomeKind)]) for cell in self.cells if cell.result is not None)
         said = [f"; {without} without equilibrium"] if without else []
         return f"SweepResult({size}{''.join(said)}{f'; {lost:,} games diverged' if lost else ''})"
 
@@ -278,19 +283,36 @@ def _folder(point: Mapping[str, Any]) -> str:
     return f"{readable}-{hashlib.sha256(exact.encode()).hexdigest()[:8]}"
 
 
-def _summary(result: StudyResult | None, many: int) -> tuple[Any, Any, Any, float]:
-    """Counts, shares with their intervals, and mean times by outcome, the fourth being divergence; all mean times."""
+def _summary(result: StudyResult | None, shown: list[int]) -> tuple[Any, Any, Any, float]:
+    """Counts, shares with their intervals, and mean times by outcome, as `_ENDS` has them; the mean time of all."""
     if result is None:
-        nothing = np.full(many, np.nan)
-        return np.zeros(many, dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
-    code = np.where(result.diverged, len(OutcomeKind), result.kind)
-    counts = np.bincount(code, minlength=many)
-    total = np.bincount(code, weights=result.time, minlength=many)
-    means = np.divide(total, counts, out=np.full(many, np.nan), where=counts > 0)
+        nothing = np.full(len(shown), np.nan)
+        return np.zeros(len(shown), dtype=np.int64), (nothing, nothing, nothing), nothing, float("nan")
+    counts = result.tally.kinds()[shown]
+    total = _times(result)[shown]
+    means = np.divide(total, counts, out=np.full(len(shown), np.nan), where=counts > 0)
     method = result.probabilities(level=_LEVEL).method
     error = (1.0 - _LEVEL) / (len(OutcomeKind) if method == "sequence" else 1)
     shares = [counts / result.trials, *ends(counts, result.trials, error, method)]
-    return counts, shares, means, float(result.time.mean())
+    return (
+        counts,
+        shares,
+        means,
+        float(result.time.mean() if result.rows.names else _times(result).sum() / result.trials),
+    )
+
+
+def _times(result: StudyResult) -> Floats:
+    """The sum of the times of the games that ended in each way; where only counts are kept, of the steps counted."""
+    kind: Any
+    times: Any
+    if result.rows.names:
+        kind, diverged, times = result.kind, result.diverged, result.time
+    else:
+        tally, sc = result.tally, result.scenario
+        kind, diverged, times = tally.kind, tally.diverged, tally.count * tally.step * (sc.horizon / sc.steps)
+    code = np.where(diverged, _ENDS.index(DIVERGED), np.where(kind == UNPLAYED, _ENDS.index(NO_EQUILIBRIUM), kind))
+    return np.bincount(code, weights=times, minlength=len(_ENDS)).astype(np.float64)
 
 
 def _labels(values: Sequence[Any]) -> list[Any]:

@@ -66,6 +66,13 @@ DIVERGED = "diverged"
 """What tables call the games that diverged, beside the kinds of ends."""
 
 
+NO_EQUILIBRIUM = "no_equilibrium"
+"""What tables call the games that have no equilibrium on [0, T], which are not played."""
+
+UNPLAYED = len(OutcomeKind)
+"""Their code, after those of the kinds of ends, where games differ from trial to trial."""
+
+
 def kind_counts(kind: NDArray[Any], diverged: NDArray[np.bool_]) -> dict[str, int]:
     """How many games ended in each way, by the name of the kind; those that diverged, if any, apart and last."""
     sound = kind[~diverged]

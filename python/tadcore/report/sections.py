@@ -13,6 +13,7 @@ import numpy as np
 from tadcore import plotting, statistics
 from tadcore._shared.arrays import Floats
 from tadcore._shared.shares import percent
+from tadcore.game.outcome import NO_EQUILIBRIUM
 from tadcore.plotting.tools.axes import for_files
 from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
@@ -75,9 +76,8 @@ def times(result: Reported, level: float | None) -> Section:
     sc = result.scenario
     found = statistics.incidence_of(result, level=level)
     rows = []
-    for name, ended in zip(
-        found.names, indicators(result.kind, result.defender, sc.n, diverged_of(result)), strict=True
-    ):
+    played = [name for name in found.names if name != NO_EQUILIBRIUM]
+    for name, ended in zip(played, indicators(result.kind, result.defender, sc.n, diverged_of(result)), strict=True):
         if ended.any():
             cells = [f"{t:.6g}" for t in np.quantile(result.time[ended], [0, 0.25, 0.5, 0.75, 1], method="lower")]
             rows.append(_row(name, cells))

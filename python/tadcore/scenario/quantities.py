@@ -34,6 +34,11 @@ class Quantity:
     """Number of the stream: 8 times the player's (attacker 0, target 1, then the defenders) plus the field's."""
 
     @property
+    def of_game(self) -> bool:
+        """Whether another value makes another game: a weight, the horizon or the step."""
+        return self.field not in STATES
+
+    @property
     def owner(self) -> str:
         """Path of the scenario's field that holds it."""
         return self.path if self.axis is None else self.path.rpartition(".")[0]
@@ -41,6 +46,8 @@ class Quantity:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of its columns in the table of a study."""
+        if self.of_game and self.components > 1:
+            return tuple(f"{self.path}.{i}" for i in range(self.components))
         if self.field != "position" or self.axis is not None:
             return (self.path,)
         return tuple(f"{self.path}.{AXES[axis]}" for axis in range(self.components))
@@ -82,7 +89,7 @@ def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[
     arrays = {"visibility_radius": sc.visibility_radii, "capture_radius": sc.capture_radii}
     arrays |= {"position": sc.positions}
     whole = {(quantity.field, quantity.row) for quantity in varied if quantity.axis is None}
-    for name in {"position"} | {quantity.field for quantity in varied}:
+    for name in {"position"} | {quantity.field for quantity in varied if not quantity.of_game}:
         common = arrays[name]
         arrays[name] = np.empty((games, *common.shape))
         for row in range(len(common)):
@@ -92,6 +99,8 @@ def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[
     for quantity in varied:
         drawn = values[:, column : column + quantity.components]
         column += quantity.components
+        if quantity.of_game:
+            continue
         if quantity.field != "position":
             arrays[quantity.field][:, quantity.row] = drawn[:, 0]
         elif quantity.axis is None:

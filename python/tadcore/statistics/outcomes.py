@@ -3,7 +3,8 @@
 An *outcome* here is an event that a trial ends in: ``"timeout"``, ``"captured"`` and ``"intercepted"``, which exclude
 one another and together are certain, then ``"d1"`` … ``"dn"``, interception by that defender, which together make up
 ``"intercepted"``. Where some trials diverged (`tadcore.game.Divergence`), a last outcome ``"diverged"`` has all of
-them, however they then ended, and no other outcome has any: the four are certain together.
+them, however they then ended, and no other outcome has any: the four are certain together. Where weights, horizon or
+step vary from trial to trial, ``"no_equilibrium"`` has those whose game has none.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, Integers, as_index, refuse_where
 from tadcore.errors import ScenarioError
-from tadcore.game.outcome import DIVERGED, OutcomeKind
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, OutcomeKind
 from tadcore.scenario.model import Scenario
 
 MOST_TRIALS = 2**40
@@ -89,7 +90,7 @@ def is_defender(name: str) -> bool:
 
 def excluding(names: Sequence[str]) -> list[int]:
     """The places of the outcomes that exclude one another and together are certain, defenders left out."""
-    return [i for i, name in enumerate(names) if name in (*KINDS, DIVERGED)]
+    return [i for i, name in enumerate(names) if name in (*KINDS, DIVERGED, NO_EQUILIBRIUM)]
 
 
 def diverged_of(result: Any) -> NDArray[np.bool_] | None:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, Integers, as_real, refuse_where
 from tadcore.errors import ScenarioError
-from tadcore.game.outcome import DIVERGED, OutcomeKind
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, UNPLAYED, OutcomeKind
 
 from .outcomes import KINDS, outcome_names
 
@@ -35,7 +35,8 @@ class Tally:
         K; a trial ends at a step from 0 to K.
     cells : ndarray of int64
         The (outcome, diverged, step) that occurred, ascending: (2 outcome + diverged) (K + 1) + step, where the outcome
-        is 0 for a timeout, 1 for a capture, and 1 + i for an interception by the i-th defender.
+        is 0 for a timeout, 1 for a capture, 1 + i for an interception by the i-th defender, and 2 + n for a game
+        without an equilibrium.
     count : ndarray of int64
         How many trials are in each, at least one.
     """
@@ -55,10 +56,11 @@ class Tally:
     def of(
         cls, kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[Any], step: NDArray[Any], n: int, steps: int
     ) -> Tally:
-        """Count trials: codes of `OutcomeKind`, defenders from 0, whether they diverged, and the steps of the ends."""
+        """Count trials: codes of `OutcomeKind` (3: not played), defenders, whether they diverged, steps."""
         code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+        code = np.where(kind == UNPLAYED, OutcomeKind.INTERCEPTED + n, code)
         cells = (2 * code.astype(np.int64) + diverged) * (steps + 1) + step
-        size = 2 * (len(OutcomeKind) - 1 + n) * (steps + 1)
+        size = 2 * (len(OutcomeKind) + n) * (steps + 1)
         if size <= max(_DENSE, len(cells)):
             dense = np.bincount(cells, minlength=size)
             found = np.flatnonzero(dense)
@@ -98,8 +100,18 @@ class Tally:
 
     @property
     def outcome(self) -> Integers:
-        """The outcome of each cell: 0 timeout, 1 captured, 1 + i intercepted by the i-th defender."""
+        """The outcome of each cell: 0 timeout, 1 captured, 1 + i intercepted by the i-th defender, 2 + n not played."""
         return self.cells // (2 * (self.steps + 1))
+
+    @property
+    def unplayed(self) -> NDArray[np.bool_]:
+        """Whether the games of each cell have no equilibrium."""
+        return np.asarray(self.outcome == OutcomeKind.INTERCEPTED + self.n)
+
+    @property
+    def kind(self) -> Integers:
+        """The code of `OutcomeKind` of each cell, 3 for no equilibrium."""
+        return np.where(self.unplayed, UNPLAYED, np.minimum(self.outcome, OutcomeKind.INTERCEPTED))
 
     @property
     def diverged(self) -> NDArray[np.bool_]:
@@ -112,9 +124,9 @@ class Tally:
         return self.cells % (self.steps + 1)
 
     def kinds(self) -> Integers:
-        """Trials by the kind of their end, then those that diverged, however they ended."""
-        code = np.where(self.diverged, len(OutcomeKind), np.minimum(self.outcome, OutcomeKind.INTERCEPTED))
-        return _summed(code, self.count, len(OutcomeKind) + 1)
+        """Trials by the kind of their end, then those that diverged, however they ended, then those not played."""
+        code = np.where(self.diverged, len(OutcomeKind), np.where(self.unplayed, len(OutcomeKind) + 1, self.kind))
+        return _summed(code, self.count, len(OutcomeKind) + 2)
 
     def outcomes(self) -> dict[str, int]:
         """How many trials ended in each outcome, by name, as `outcome_counts` has them.
@@ -129,7 +141,8 @@ class Tally:
 
     def names(self) -> tuple[str, ...]:
         """The rows of `ended`."""
-        return outcome_names(self.n, diverged=bool(self.diverged.any()))
+        names = outcome_names(self.n, diverged=bool(self.diverged.any()))
+        return (*names, NO_EQUILIBRIUM) if self.unplayed.any() else names
 
     def ended(self) -> Integers:
         """How many trials ended in each outcome at each step, shape (outcomes, K + 1).
@@ -143,14 +156,14 @@ class Tally:
             raise ScenarioError("kind", "no trials", "the outcomes of at least one trial")
         names = self.names()
         rows = np.zeros((len(names), self.steps + 1), dtype=np.int64)
-        sound = ~self.diverged
-        kind = np.minimum(self.outcome, OutcomeKind.INTERCEPTED)
-        np.add.at(rows, (kind[sound], self.step[sound]), self.count[sound])
+        sound = ~self.diverged & ~self.unplayed
+        np.add.at(rows, (self.kind[sound], self.step[sound]), self.count[sound])
         by = sound & (self.outcome >= OutcomeKind.INTERCEPTED)
         of_team: Integers = self.outcome[by] + (len(KINDS) - int(OutcomeKind.INTERCEPTED))
         rows[of_team, self.step[by]] = self.count[by]
-        if DIVERGED in names:
-            rows[names.index(DIVERGED)] = _summed(self.step[~sound], self.count[~sound], self.steps + 1)
+        for name, apart in ((DIVERGED, self.diverged), (NO_EQUILIBRIUM, self.unplayed)):
+            if name in names:
+                rows[names.index(name)] = _summed(self.step[apart], self.count[apart], self.steps + 1)
         return rows
 
     def __repr__(self) -> str:

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 
 from tadcore._shared.files import MOST, strange
 from tadcore.errors import StoreError
-from tadcore.game.outcome import OutcomeKind
+from tadcore.game.outcome import UNPLAYED, OutcomeKind
 from tadcore.statistics.tally import Tally
 
 from .manifest import faults
@@ -58,15 +58,14 @@ def ranges_in(folder: Path) -> list[tuple[int, int, Path]]:
 def content_of(counted: Counted, plan: Plan, study: str) -> memoryview:
     """The bytes of the file: a function of the counts and of the study alone."""
     tally, sc = counted.tally, plan.scenario
-    names = outcome_names(sc.n)
-    lost = len(names) - 1
-    words = pa.DictionaryArray.from_arrays(
-        pa.array(np.where(tally.diverged, lost, tally.outcome).astype(np.int32)), pa.array(names)
-    )
-    by = tally.outcome >= OutcomeKind.INTERCEPTED
+    names = outcome_names(sc.n, games=bool(plan.games))
+    lost = OutcomeKind.INTERCEPTED + sc.n
+    code = np.where(tally.diverged, lost, np.where(tally.unplayed, lost + 1, tally.outcome))
+    words = pa.DictionaryArray.from_arrays(pa.array(code.astype(np.int32)), pa.array(names))
+    by = (tally.outcome >= OutcomeKind.INTERCEPTED) & ~tally.unplayed
     columns = {
         "outcome": words,
-        "kind": pa.array(np.minimum(tally.outcome, OutcomeKind.INTERCEPTED).astype(np.int8)),
+        "kind": pa.array(tally.kind.astype(np.int8)),
         "defender": pa.array(np.where(by, tally.outcome - OutcomeKind.INTERCEPTED, -1).astype(np.int32)),
         "diverged": pa.array(tally.diverged),
         "step": pa.array(tally.step),
@@ -97,13 +96,14 @@ def read_counts(path: Path, first: int, end: int, plan: Plan, study: str) -> Cou
             table[name].to_numpy().astype(np.int64) for name in ("kind", "defender", "step", "trials")
         )
         code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+        code = np.where(kind == UNPLAYED, OutcomeKind.INTERCEPTED + sc.n, code)
         cells = (2 * code + table["diverged"].to_numpy()) * (sc.steps + 1) + step
     except (OSError, ValueError, KeyError, pa.ArrowException) as error:
         raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
     if said["study"] != study:
         raise StoreError(str(path), "it belongs to another study", "move it out of this folder, or name another store")
     tally = Tally(sc.n, sc.steps, cells, trials)
-    last = 2 * (len(OutcomeKind) - 1 + sc.n) * (sc.steps + 1)
+    last = 2 * (len(OutcomeKind) + sc.n) * (sc.steps + 1)
     whole = cells.size and cells[0] >= 0 and cells[-1] < last and (np.diff(cells) > 0).all() and (trials > 0).all()
     if not whole or (said["first"], said["end"], said["sha256"]) != (str(first), str(end), _digest(tally)):
         raise StoreError(str(path), "it is damaged (its counts are not those that were written)", _AGAIN)

@@ -106,6 +106,11 @@ class Definition:
         return self.plan.quantities
 
     @property
+    def games(self) -> tuple[str, ...]:
+        """What varies and makes every trial a game of its own; empty where all trials share one."""
+        return self.plan.games
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs, one for each varied component."""
         return self.plan.columns
@@ -160,4 +165,5 @@ class Definition:
 
     def __repr__(self) -> str:
         paths = ", ".join(f"{path} ({type(sampler).__name__})" for path, sampler in self.vary.items())
-        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths})"
+        own = f"; {self.games[0]} varies, so every trial is a game of its own" if self.games else ""
+        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths}{own})"

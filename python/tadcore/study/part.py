@@ -8,7 +8,7 @@ from typing import Any
 
 from tadcore._shared.arrays import as_index
 from tadcore.errors import ScenarioError
-from tadcore.game.outcome import DIVERGED
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.outcomes import KINDS
 from tadcore.statistics.tally import Tally
@@ -48,10 +48,9 @@ class StudyPart:
 
 
 def named(tally: Tally) -> dict[str, int]:
-    """Counts by the kind of the end; those that diverged, if any, apart and last."""
-    *kinds, lost = (int(count) for count in tally.kinds())
-    counts = dict(zip(KINDS, kinds, strict=True))
-    return counts | {DIVERGED: lost} if lost else counts
+    """Counts by the kind of the end; those that diverged and those without an equilibrium, if any, apart and last."""
+    counts = dict(zip((*KINDS, DIVERGED, NO_EQUILIBRIUM), map(int, tally.kinds()), strict=True))
+    return {name: count for name, count in counts.items() if count or name in KINDS}
 
 
 def as_part(value: Any) -> tuple[int, int]:

@@ -143,7 +143,7 @@ class Format:
         if not whole:
             raise StoreError(str(part.path), "it is damaged (its rows are not those that were written)", _AGAIN)
         # A digest tells an accident, not an intention: what cannot be an outcome is none, whatever is said of it.
-        found = flaw(table, wanted.start * CHUNK, self.plan.scenario, self.plan.termination)
+        found = flaw(table, wanted.start * CHUNK, self.plan)
         if found is None and len(self.plan.columns) and self.plan.columns[0] in table.column_names:
             try:
                 inputs = np.stack([table[name].to_numpy() for name in self.plan.columns], axis=1)
@@ -205,6 +205,6 @@ def _unpacked(text: str, plan: Plan) -> Tally | None:
         return None
     apart, count = np.split(numbers, 2)
     cells = np.cumsum(apart)
-    last = 2 * (2 + n) * (steps + 1)
+    last = 2 * (3 + n) * (steps + 1)
     fits = apart[0] >= 0 and (apart[1:] > 0).all() and cells[-1] < last and (count > 0).all()
     return Tally(n, steps, cells, count) if fits else None

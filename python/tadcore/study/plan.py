@@ -8,14 +8,14 @@ import threading
 import time
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._core import Game, Stop
+from tadcore._core import Game, Stop, simulate_games
 from tadcore._shared.arrays import Floats
-from tadcore._shared.limits import OF_FIELD, can_be_told, sees_whom_it_intercepts, too_far
+from tadcore._shared.limits import OF_FIELD, can_be_told, divides, sees_whom_it_intercepts, too_far
 from tadcore._shared.progress import bar
 from tadcore._shared.threads import in_order
 from tadcore.errors import ScenarioError
@@ -23,6 +23,7 @@ from tadcore.game.compiled import game_of
 from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.numbers import GAMMA, games_of
 from tadcore.scenario.quantities import Quantity, setups
 from tadcore.simulation.rules import extents_of
 from tadcore.simulation.termination import Termination
@@ -135,6 +136,7 @@ class Plan:
         for values, (name, kind) in zip(inputs.T, fields, strict=True):
             for rule in OF_FIELD[kind]:
                 self._refuse(chunk, name, values, ~rule.holds(values), rule.words)
+        self._check_games(chunk, inputs)
         positions, sight, capture = setups(self.scenario, self.quantities, inputs)
         for i in range(self.scenario.n):
             reach, seen = (np.broadcast_to(radii[..., i], len(inputs)) for radii in (capture, sight))
@@ -146,6 +148,18 @@ class Plan:
             bad = ~can_be_told(seen, extents)
             path = f"defenders.{i}.visibility_radius" if i < self.scenario.n else f"{where}.visibility_radius"
             self._refuse(chunk, path, np.broadcast_to(seen, bad.shape), bad, too_far(float(extents[int(bad.argmax())])))
+
+    def _check_games(self, chunk: int, inputs: Floats) -> None:
+        """The rules that tie the numbers of a game together."""
+        if not self.games:
+            return
+        rows = games_of(self.scenario, self.quantities, inputs)
+        horizon, step = rows[:, 0], rows[:, 1]
+        if "step" in self.games:
+            self._refuse(chunk, "step", step, ~divides(horizon, step), "a divisor of the horizon")
+        self._refuse(chunk, "horizon", horizon, ~divides(horizon, step), "a multiple of the step")
+        gamma = rows[:, -len(self.scenario.synthesis_weights) :]
+        self._refuse(chunk, GAMMA, gamma.sum(axis=1), ~(gamma > 0.0).any(axis=1), "weights of which one is positive")
 
     def check_ahead(
         self, trials: int, only: range | None = None, *, threads: int | None = None, progress: bool = False
@@ -174,6 +188,8 @@ class Plan:
             ends = sampler.bounds()
             if quantity.field == "position":
                 farthest = max(farthest, *map(abs, ends))
+            if quantity.field in ("horizon", "step", GAMMA):
+                return False
             if not all(rule.holds(end) for rule in OF_FIELD[quantity.field] for end in ends):
                 return False
             reach[quantity.field, quantity.row] = ends
@@ -182,7 +198,7 @@ class Plan:
         pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
         return all(sees_whom_it_intercepts(capture[1], sight[0]) for capture, sight in pairs)
 
-    def _refuse(self, chunk: int, path: str, values: Floats, bad: NDArray[np.bool_], rule: str) -> None:
+    def _refuse(self, chunk: int, path: str, values: Floats, bad: Any, rule: str) -> None:
         if bad.any():
             row = int(bad.argmax())
             raise ScenarioError(f"{path}, trial {chunk * CHUNK + row:,}", float(values[row]), rule)
@@ -192,20 +208,46 @@ class Plan:
         """The compiled game, shared by all that have its weights."""
         return game_of(self.scenario)
 
+    @cached_property
+    def games(self) -> tuple[str, ...]:
+        """What varies and makes every trial a game of its own; empty where all share one and its table of gains."""
+        return tuple(quantity.path for quantity in self.quantities if quantity.of_game)
+
+    @property
+    def between(self) -> bool:
+        """Whether a game may end between the instants of the scenario's grid."""
+        return self.termination == "continuous" or "horizon" in self.games or "step" in self.games
+
     def play(self, inputs: Floats, threads: int | None, stop: Stop | None = None) -> Outcomes:
         """Play the trials that have these inputs; the core refuses what is no game, and ends when ``stop`` is set."""
         setup = setups(self.scenario, self.quantities, inputs)
         starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
-        continuous = self.termination == "continuous"
-        kind, defender, time, diverged, passed = self.game.simulate_batch(
-            starts, sight, capture, continuous=continuous, passes=self.passes, threads=threads, stop=stop
-        )
+        continuous, passes = self.termination == "continuous", self.passes
+        if self.games:
+            interaction, numbers = self.scenario.interaction, games_of(self.scenario, self.quantities, inputs)
+            kind, defender, time, _, diverged, passed = simulate_games(
+                interaction,
+                numbers,
+                starts,
+                sight,
+                capture,
+                continuous=continuous,
+                passes=passes,
+                threads=threads,
+                stop=stop,
+            )
+        else:
+            kind, defender, time, diverged, passed = self.game.simulate_batch(
+                starts, sight, capture, continuous=continuous, passes=passes, threads=threads, stop=stop
+            )
         return Outcomes(kind, defender, time, diverged, inputs, passed if self.passes else None)
 
     def tally(self, outcomes: Outcomes) -> Tally:
-        """How many of the trials ended in each way at each step."""
+        """How many of the trials ended in each way at each step of the scenario's grid, later ones at its last."""
         sc = self.scenario
-        step, _ = steps_of(outcomes.time, sc.horizon, sc.steps, between=self.termination == "continuous")
+        step, _ = steps_of(outcomes.time, sc.horizon, sc.steps, between=self.between)
+        if "horizon" in self.games:
+            step = np.minimum(step, sc.steps)
         return Tally.of(outcomes.kind, outcomes.defender, outcomes.diverged, step, sc.n, sc.steps)
 
     def run(self, task: Task, threads: int | None, stop: Stop | None = None) -> Played:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.shares import share
-from tadcore.game.outcome import DIVERGED, OutcomeKind
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, OutcomeKind
 
 _FORMAT = "{{desc}}|{{bar}}| {{n_fmt}}/{{total_fmt}} [{left}, {rate}/s, {shown}]"
 _MINUTE = 60.0  # seconds over which the rate is measured, and between two lines of a log
@@ -34,7 +34,7 @@ class Progress:
     """
 
     def __init__(self, total: int, *, wanted: bool | str) -> None:
-        self._counts = np.zeros(len(OutcomeKind) + 1, dtype=np.int64)
+        self._counts = np.zeros(len(OutcomeKind) + 2, dtype=np.int64)
         self._total, self._done = total, 0
         self._label = f"{wanted}: " if isinstance(wanted, str) else ""
         self._wanted = bool(wanted)
@@ -48,7 +48,7 @@ class Progress:
             self._bar = tqdm(total=total, desc=self._label or None, unit="", unit_scale=True, dynamic_ncols=True)
 
     def add(self, counts: NDArray[np.int64], *, stored: bool = False) -> None:
-        """Count the outcomes of a chunk, by kind and last those that diverged; a store's do not enter the rate."""
+        """Count the outcomes of a chunk, as `Tally.kinds` has them; a store's do not enter the rate."""
         if not self._wanted:
             return
         self._counts += counts
@@ -81,8 +81,9 @@ class Progress:
         order = (OutcomeKind.INTERCEPTED, OutcomeKind.CAPTURED, OutcomeKind.TIMEOUT)
         # "P(kind)" without its letters: the line has to fit into 80 columns, rate and all.
         shown = [f"{kind.name.lower()} {share(float(estimates[kind]), 3)}" for kind in order]
-        if estimates[-1]:
-            shown.append(f"{DIVERGED} {share(float(estimates[-1]), 3)}")
+        for estimate, name in zip(estimates[len(OutcomeKind) :], (DIVERGED, NO_EQUILIBRIUM), strict=True):
+            if estimate:
+                shown.append(f"{name} {share(float(estimate), 3)}")
         return {"left": left, "rate": tqdm.format_sizeof(rate) if rate else "?", "shown": " ".join(shown)}
 
     def __enter__(self) -> Self:

@@ -60,7 +60,10 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
     chunks = chunks_of(part, study.trials)
     plan = study.plan
     plan.check_ahead(study.trials, chunks, threads=threads, progress=bool(progress))
-    plan.game.equilibrium()
+    if not plan.games:
+        plan.game.equilibrium()
+    elif table is not None:
+        raise ScenarioError("table", str(table), f"left out: {plan.games[0]} varies, so trials share no table of gains")
     with contextlib.ExitStack() as running:
         running.enter_context(warm(study.scenario, table))
         store = None

@@ -57,9 +57,9 @@ class Study(Definition):
     sc : Scenario, path or name
         The game; what does not vary is as it says.
     vary : mapping of str to sampler
-        Paths of positions, visibility radii and capture radii, such as ``"attacker.position"``,
-        ``"d1.visibility_radius"``, ``"d*.capture_radius"`` or ``"*.position"``, and how to draw
-        them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
+        Paths of positions, radii, weights, the horizon and the step, such as ``"attacker.position"``,
+        ``"d1.visibility_radius"``, ``"d*.capture_radius"``, ``"*.position"`` or ``"attacker.control_weight"``, and how
+        to draw them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
         ``f(rng, size)``. With a wildcard every player draws for itself.
     trials : int
         How many games.
@@ -80,10 +80,16 @@ class Study(Definition):
     Raises
     ------
     ScenarioError
-        A path leads nowhere or to a weight, a sampler does not fit, there are no trials.
+        A path leads nowhere, a sampler does not fit, there are no trials.
 
     Notes
     -----
+    Positions and radii are no part of a game, so where these alone vary all trials share one equilibrium and one table
+    of gains. Where a weight, λ, γ, the horizon or the step varies every trial is a game of its own: its Riccati
+    equations are solved and its gains synthesised as it meets networks, some 10⁴ times the work. A game without an
+    equilibrium is the outcome ``"no_equilibrium"``. Outcomes are counted at the steps of the scenario's own grid, each
+    at the first at or after its end, and what ends later at the last. `games` says which way a study takes.
+
     The draws of the random design come from ``numpy.random.Philox``, keyed by (seed, chunk) and with the varied
     quantity in the counter; with one seed, two studies that vary the same position draw the same positions, whatever
     else they vary. A callable must be a function of its arguments alone. A store knows it by its qualified name and
@@ -297,9 +303,12 @@ class StudyResult(Trials):
             )
         )
         changes: dict[str, Any] = {}
+        column = 0
         for quantity in self.study.quantities:
-            value = arrays[quantity.field][0, quantity.row]
-            changes[quantity.owner] = value.tolist() if value.ndim else float(value)
+            own = drawn[0, column : column + quantity.components]
+            column += quantity.components
+            value = own if quantity.of_game else np.atleast_1d(arrays[quantity.field][0, quantity.row])
+            changes[quantity.owner] = float(value[0]) if len(value) == 1 else value.tolist()
         return self.scenario.replace(changes)
 
     def replay(self, trial: int) -> Run:

@@ -22,10 +22,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore.game.outcome import DIVERGED, OutcomeKind
+from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, UNPLAYED, OutcomeKind
 from tadcore.sampling.design import CHUNK
-from tadcore.scenario.model import Scenario
-from tadcore.simulation.termination import Termination
 from tadcore.statistics.tally import Tally, steps_of
 
 from .keeping import Keep
@@ -40,21 +38,25 @@ class Column:
 
     type: pa.DataType
     meaning: str
-    values: Callable[[int, Outcomes, Scenario], Any]
+    values: Callable[[int, Outcomes, Plan], Any]
     unit: str = ""
 
 
-def outcome_names(n: int) -> list[str]:
-    """The categories of ``outcome``: the ends without an interception, the defenders, and games that diverged."""
-    return ["timeout", "captured", *(f"d{i + 1}" for i in range(n)), DIVERGED]
+def outcome_names(n: int, *, games: bool = False) -> list[str]:
+    """The categories of ``outcome``: the ends without an interception, the defenders, and games that diverged.
+
+    Where trials are games of their own, those without an equilibrium are the last.
+    """
+    team = (f"d{i + 1}" for i in range(n))
+    return ["timeout", "captured", *team, DIVERGED, *([NO_EQUILIBRIUM] if games else [])]
 
 
-def _outcome(
-    kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[np.bool_], sc: Scenario
-) -> pa.DictionaryArray:
+def _outcome(kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[np.bool_], plan: Plan) -> pa.DictionaryArray:
+    lost = OutcomeKind.INTERCEPTED + plan.scenario.n
     code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
-    code = np.where(diverged, OutcomeKind.INTERCEPTED + sc.n, code)
-    return pa.DictionaryArray.from_arrays(code.astype(np.int32), pa.array(outcome_names(sc.n)))
+    code = np.where(diverged, lost, np.where(kind == UNPLAYED, lost + 1, code))
+    names = outcome_names(plan.scenario.n, games=bool(plan.games))
+    return pa.DictionaryArray.from_arrays(code.astype(np.int32), pa.array(names))
 
 
 FIXED = {
@@ -64,11 +66,13 @@ FIXED = {
     "outcome": Column(
         pa.dictionary(pa.int32(), pa.string()),
         "how the game ended: timeout, captured (the attacker reached the target), the defender that intercepted, or "
-        "diverged, however it then ended",
-        lambda _, o, sc: _outcome(o.kind, o.defender, o.diverged, sc),
+        "diverged, however it then ended; no_equilibrium where a trial has a game of its own, without one",
+        lambda _, o, plan: _outcome(o.kind, o.defender, o.diverged, plan),
     ),
     "kind": Column(
-        pa.int8(), "code of tadcore.OutcomeKind: 0 timeout, 1 captured, 2 intercepted", lambda _, o, __: o.kind
+        pa.int8(),
+        "code of tadcore.OutcomeKind: 0 timeout, 1 captured, 2 intercepted; 3 no equilibrium, so not played",
+        lambda _, o, __: o.kind,
     ),
     "defender": Column(
         pa.int32(),
@@ -95,6 +99,11 @@ _INPUTS = {
     "position": "where the player starts, one coordinate",
     "visibility_radius": "how far the player sees; inf without limit",
     "capture_radius": "how near the player must come to intercept or capture",
+    "weight": "a weight of a player's cost",
+    "fraction": "how much the attacker evades: 0 suicidal, 1 evading",
+    "synthesis_weights": "a weight of a term of Theta",
+    "horizon": "the horizon T of the trial",
+    "step": "the step of the trial's grid",
 }
 
 
@@ -125,7 +134,7 @@ def schema_of(plan: Plan, keep: Keep) -> pa.Schema:
 def table_of(first: int, chunks: Sequence[Outcomes], plan: Plan, schema: pa.Schema) -> pa.Table:
     """Consecutive chunks as a table, from the number of their first trial on."""
     outcomes = chunks[0] if len(chunks) == 1 else _joined(chunks)
-    fixed = [column.values(first, outcomes, plan.scenario) for column in _own(plan).values()]
+    fixed = [column.values(first, outcomes, plan) for column in _own(plan).values()]
     inputs = () if outcomes.inputs is None else np.ascontiguousarray(outcomes.inputs.T)
     return pa.Table.from_arrays([pa.array(array) for array in (*fixed, *inputs)], schema=schema)
 
@@ -144,23 +153,24 @@ def tally_of(table: pa.Table, plan: Plan) -> Tally:
     return plan.tally(Outcomes(kind, defender, time, diverged, None))
 
 
-def flaw(table: pa.Table, first: int, sc: Scenario, termination: Termination = "sampled") -> str | None:
+def flaw(table: pa.Table, first: int, plan: Plan) -> str | None:
     """What no study could have written, in words; None where every row can be how a game ended."""
+    sc = plan.scenario
     kind, defender, time, diverged = (table[name].to_numpy() for name in ("kind", "defender", "time", "diverged"))
-    _, on_grid = steps_of(time, sc.horizon, sc.steps, between=termination == "continuous")
-    within = (time >= 0.0) & (time <= sc.horizon * (1.0 + 1e-9))
-    last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon)
+    own = "horizon" in plan.games  # each trial has a T of its own
+    _, on_grid = steps_of(time, sc.horizon, sc.steps, between=plan.between)
+    within = (time >= 0.0) & (time <= (np.inf if own else sc.horizon * (1.0 + 1e-9)))
+    last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon) | own
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
-    known = np.isin(kind, list(OutcomeKind))
-    same = _words(table, outcome_names(sc.n)) == np.asarray(
-        _outcome(kind * known, one * defender, diverged, sc).indices
-    )
-    when = "a time" if termination == "continuous" else "an instant of the grid"
+    known = np.isin(kind, [*OutcomeKind, *([UNPLAYED] if plan.games else [])])
+    names = outcome_names(sc.n, games=bool(plan.games))
+    same = _words(table, names) == np.asarray(_outcome(kind * known, one * defender, diverged, plan).indices)
+    when = "a time" if plan.between else "an instant of the grid"
     rules = {
         "trial": (table["trial"].to_numpy() == np.arange(first, first + len(kind)), "the number of its row"),
         "kind": (known, "a code of tadcore.OutcomeKind"),
         "defender": (one, "a defender where one intercepted, and -1 elsewhere"),
-        "time": (on_grid & within & last, f"{when} up to T = {sc.horizon:g}, for a timeout T itself"),
+        "time": ((on_grid | own) & within & last, f"{when} up to T = {sc.horizon:g}, for a timeout T itself"),
         "outcome": (same, "what kind, defender and diverged say"),
     }
     for name, (holds, rule) in rules.items():

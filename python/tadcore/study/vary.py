@@ -10,8 +10,9 @@ from tadcore.sampling.adapters import as_sampler
 from tadcore.sampling.base import Sampler
 from tadcore.scenario.hints import hint, wildcards
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.numbers import game_quantities_of
 from tadcore.scenario.paths import beyond, expand, normal
-from tadcore.scenario.quantities import STATES, Quantity, quantities_of
+from tadcore.scenario.quantities import Quantity, quantities_of
 
 
 def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, Sampler], ...]:
@@ -20,9 +21,9 @@ def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, S
     Raises
     ------
     ScenarioError
-        A path leads nowhere or to a weight, two paths mean the same quantity, or a sampler does not fit.
+        A path leads nowhere, two paths mean the same quantity, or a sampler does not fit.
     """
-    known = quantities_of(sc)
+    known = quantities_of(sc) | game_quantities_of(sc)
     found: dict[str, tuple[Quantity, Sampler, str]] = {}
     for path, value in vary.items():
         field = f'vary["{path}"]'
@@ -47,12 +48,14 @@ def _same(one: Quantity, other: Quantity) -> bool:
 
 def _rule(sc: Scenario, known: Mapping[str, Quantity], path: str) -> str:
     """What the path of something that cannot vary must be."""
-    weights = [name for name in sc.paths if name.rpartition(".")[2] not in STATES]
-    if expand(path, weights):
+    if expand(path, ["interaction"]):
         way = f'tadcore.sweep(study, {{"{path}": [...]}})'
-        return f"a position or a radius: anything else makes another game, which {way} varies"
+        return f"a number: {way} plays both interactions"
     if sc.interaction == "I1" and normal(path) == "target.visibility_radius":
         return "left out: it belongs to interaction I2, and this is I1, where the target sees all"
     nearest = hint(path, wildcards(known))
-    some = "attacker.position, d*.visibility_radius or d1.capture_radius"
-    return beyond(sc.n, path) or f"the path of a position or a radius, such as {some}{nearest and f'; {nearest}'}"
+    some = "attacker.position, d*.visibility_radius or d1.control_weight"
+    return (
+        beyond(sc.n, path)
+        or f"the path of a position, a radius or a weight, such as {some}{nearest and f'; {nearest}'}"
+    )

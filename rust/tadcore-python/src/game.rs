@@ -36,7 +36,7 @@ fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
     array.map(|a| a.as_array().iter().copied().collect()).unwrap_or_default()
 }
 
-fn termination(continuous: bool) -> Termination {
+pub(crate) fn termination(continuous: bool) -> Termination {
     if continuous { Termination::Continuous } else { Termination::Sampled }
 }
 

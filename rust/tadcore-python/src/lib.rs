@@ -8,6 +8,7 @@ mod equilibrium;
 mod errors;
 mod gains;
 mod game;
+mod games;
 mod generation;
 mod guard;
 mod outside;
@@ -30,6 +31,8 @@ mod _core {
     use super::gains::Gains;
     #[pymodule_export]
     use super::game::Game;
+    #[pymodule_export]
+    use super::games::simulate_games;
     #[pymodule_export]
     use super::record::Record;
     #[pymodule_export]

@@ -117,3 +117,22 @@ def test_the_draws_of_every_cell_are_checked_before_any_runs(monkeypatch, tmp_pa
         sweep(base, {"d1.capture_radius": [0.1, 0.2, smallest]}, store=tmp_path / "store")
     assert caught.value.__notes__ == [f"(in the cell defenders.0.capture_radius = {smallest!r})"]
     assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize("keep", ["all", "outcomes", "counts"])
+def test_what_a_study_keeps_does_not_change_a_sweep(keep):
+    grid = {"attacker.control_weight": [0.8, 1.2]}
+    whole, found = (sweep(study(300, keep=way), grid).to_xarray() for way in ("all", keep))
+    assert found["count"].equals(whole["count"])
+    assert found["probability"].equals(whole["probability"])
+    assert np.allclose(found["mean_time"], whole["mean_time"], rtol=1e-12, equal_nan=True)
+    assert np.allclose(found["mean_end"], whole["mean_end"], rtol=1e-12)
+
+
+def test_games_of_their_own_are_swept_too():
+    """In each cell some horizons have no equilibrium, and are an outcome."""
+    base = Study(escaping(3.0), {"horizon": [2.0, 4.0]}, trials=40, seed=1)
+    data = sweep(base, {"attacker.capture_radius": [0.1, 0.2]}).to_xarray()
+    lost = int((base.inputs()["horizon"] > ESCAPE).sum())
+    assert data["count"].sel(outcome="no_equilibrium").values.tolist() == [lost, lost]
+    assert data["count"].sum("outcome").values.tolist() == [40, 40]

@@ -17,7 +17,7 @@ def clock(monkeypatch):
 
 
 def some(trials):
-    return np.array([trials // 2, 0, trials - trials // 2, 0])
+    return np.array([trials // 2, 0, trials - trials // 2, 0, 0])
 
 
 def test_a_log_has_a_line_a_minute_with_the_rate_of_the_last(clock, capsys):

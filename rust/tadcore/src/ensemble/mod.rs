@@ -17,6 +17,7 @@
 mod between;
 mod chunk;
 mod fates;
+pub mod games;
 mod noise;
 mod trials;
 
@@ -167,13 +168,19 @@ pub fn run_with(
     }
     let mut ends = Vec::new();
     memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
-    let cores = available_parallelism().map_or(1, usize::from);
-    let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
-    let threads = threads.min(trials.div_ceil(block::BLOCK)).max(1);
-    // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
-    memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
+    let threads = threads_for(threads, trials.div_ceil(block::BLOCK))?;
     play(policy, batch, played.as_ref(), between, threads, Width::in_use(), &mut ends, cancel)?;
     Ok(ends)
+}
+
+/// How many threads to start where so many could have work.
+fn threads_for(threads: Option<usize>, work: usize) -> Result<usize, RunError> {
+    let cores = available_parallelism().map_or(1, usize::from);
+    let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
+    let threads = threads.min(work).max(1);
+    // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
+    memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
+    Ok(threads)
 }
 
 /// Trials of one chunk at most in a game of N = `size`.
