@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from tadcore._core import simulate_games
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
-from tadcore.scenario.quantities import component
+from tadcore.game.outcome import NO_EQUILIBRIUM, UNPLAYED
+from tadcore.sampling.adapters import as_sampler
+from tadcore.sampling.base import Block, Sampler
+from tadcore.scenario.model import Scenario
+from tadcore.scenario.numbers import game_quantities_of, games_of
+from tadcore.scenario.paths import normal
+from tadcore.scenario.quantities import Quantity, component, setups
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
-from tadcore.simulation.starts import rows_of
 from tadcore.statistics.outcomes import indicators, outcome_names
-from tadcore.statistics.sobol import Distribution, Sensitivity, sobol
+from tadcore.statistics.sobol import Distribution, Joint, Sensitivity, sobol
+from tadcore.study.vary import quantities
+
+_LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open unit cube
 
 
 @public
 def sensitivity(
     sc: ScenarioLike,
-    inputs: Mapping[str, Distribution],
+    inputs: Mapping[str, Any],
     *,
     points: int = 1024,
     seed: int = 0,
@@ -32,20 +42,25 @@ def sensitivity(
 ) -> Sensitivity:
     """Play games at n (d + 2) points and say which inputs decide their outcomes.
 
+    Where a weight, λ, γ, the horizon or the step is among the inputs, every point is a game of its own, as in a study
+    that varies it (`tadcore.Study`).
+
     Parameters
     ----------
     sc : Scenario, path or name
         What holds where nothing varies.
     inputs : mapping of str to distribution
-        Independent distributions of single numbers, by name: ``"attacker.position.x"``,
-        ``"d1.visibility_radius"``, ``"target.position.y"``, …; anything with a ``ppf``.
+        Independent inputs: paths of numbers and how they are distributed, such as ``"attacker.position.x"`` or
+        ``"d1.visibility_radius"`` with anything that has a ``ppf``; or what a study varies, with its samplers
+        (``sensitivity(study.scenario, study.vary)``). A position that is drawn as a whole is one input.
     points : int
         n, a power of 2.
     seed : int
         Of the points and of the bootstrap.
     outputs : sequence of str
-        Outcomes, ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` … and ``"diverged"``, and ``"time"``, when
-        the game ends; the end of a game that diverged is a timeout as a rule, at T.
+        Outcomes, ``"timeout"``, ``"captured"``, ``"intercepted"``, ``"d1"`` …, ``"diverged"`` and
+        ``"no_equilibrium"``, and ``"time"``, when the game ends; the end of a game that diverged is a timeout as a
+        rule, at T.
     level : float
         Confidence level of each interval.
     resamples : int
@@ -62,30 +77,68 @@ def sensitivity(
     Raises
     ------
     ScenarioError
-        A name is not one of a number that may vary within one game, a drawn value breaks a rule, or an option does.
+        A name is not one of a number of the game, a drawn value breaks a rule, or an option does.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
     sc = as_scenario(sc)
     if not isinstance(inputs, Mapping):
         raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
-    known = (*outcome_names(sc.n, diverged=True), "time")
+    known = (*outcome_names(sc.n, diverged=True), NO_EQUILIBRIUM, "time")
     if isinstance(outputs, str) or not isinstance(outputs, Iterable):
         raise ScenarioError("outputs", outputs, f"a sequence of names, each one of {', '.join(known)}")
     wanted = tuple(outputs)
     for output in wanted:
         one_of("outputs", output, known)
-    taken: dict[str, str] = {}
-    for name in inputs:
-        path = component(sc, name).path
-        if path in taken:
-            raise ScenarioError(f"inputs[{name!r}]", name, f"named once only: {taken[path]!r} is the same number")
-        taken[path] = name
+    varied, drawn = _inputs(sc, inputs)
 
     def play(x: Floats) -> Floats:
-        rows = rows_of(sc, dict(zip(inputs, x, strict=True)), x.shape[1])
-        batch = simulate_batch(sc, rows.positions, rows.visibility_radii, rows.capture_radii, threads=threads)
-        found = np.vstack([indicators(batch.kind, batch.defender, sc.n, batch.diverged), batch.time])
-        return np.asarray(found[[known.index(output) for output in wanted]], dtype=np.float64)
+        found = _events(sc, varied, np.ascontiguousarray(x.T), threads)
+        return found[[known.index(output) for output in wanted]]
 
-    return sobol(play, inputs, wanted, points=points, seed=seed, level=level, resamples=resamples)
+    return sobol(play, drawn, wanted, points=points, seed=seed, level=level, resamples=resamples)
+
+
+def _inputs(sc: Scenario, inputs: Mapping[str, Any]) -> tuple[tuple[Quantity, ...], dict[str, Distribution | Joint]]:
+    """The quantities that the inputs mean, and how each is drawn, by its name."""
+    varied: list[Quantity] = []
+    drawn: dict[str, Distribution | Joint] = {}
+    taken: dict[str, str] = {}
+    for name, given in inputs.items():
+        by_ppf = callable(getattr(given, "ppf", None)) and not isinstance(given, Sampler)
+        found = [component(sc, name)] if by_ppf and name not in game_quantities_of(sc) else None
+        sampler = given if isinstance(given, Sampler) else as_sampler(f"inputs[{name!r}]", given)
+        for quantity, own in [(q, sampler) for q in found] if found else quantities(sc, {name: given}):
+            if quantity.path in taken:
+                rule = f"named once only: {taken[quantity.path]!r} is the same number"
+                raise ScenarioError(f"inputs[{name!r}]", name, rule)
+            taken[quantity.path] = name
+            if not own.by_points:
+                raise ScenarioError(f"inputs[{name!r}]", given, "a sampler with quantiles")
+            label = name if found or quantity.path == normal(name) else quantity.path
+            varied.append(quantity)
+            drawn[label] = given if by_ppf and quantity.components == 1 else _joint(own, quantity.components)
+    return tuple(varied), drawn
+
+
+def _joint(sampler: Sampler, components: int) -> Joint:
+    def draw(points: Floats) -> Floats:
+        inside = np.clip(points, _LOWEST, _HIGHEST)
+        return sampler.draw(Block(inside, np.random.default_rng(0), 0), components)
+
+    return Joint(sampler.coordinates(components), draw)
+
+
+def _events(sc: Scenario, varied: tuple[Quantity, ...], values: Floats, threads: int | None) -> Floats:
+    """Whether each trial ended in each outcome, last without an equilibrium, and when it ended."""
+    starts, sight, capture = setups(sc, varied, values)
+    if not any(quantity.of_game for quantity in varied):
+        batch = simulate_batch(sc, starts, sight, capture, threads=threads)
+        kind, defender, time, diverged = batch.kind, batch.defender, batch.time, batch.diverged
+    else:
+        rows = (np.ascontiguousarray(np.atleast_2d(array)) for array in (starts, sight, capture))
+        numbers = games_of(sc, varied, values)
+        kind, defender, time, _, diverged, _ = simulate_games(sc.interaction, numbers, *rows, threads=threads)
+    played = kind != UNPLAYED
+    events = indicators(np.where(played, kind, 0), defender, sc.n, diverged)
+    return np.asarray(np.vstack([events & played, ~played, time]), dtype=np.float64)

@@ -114,9 +114,25 @@ class Sensitivity:
         return as_html(*self._table())
 
 
+@dataclass(frozen=True)
+class Joint:
+    """An input of several numbers that are drawn together, such as a position in a disk: its indices are those of all.
+
+    Attributes
+    ----------
+    coordinates : int
+        Coordinates of the unit cube that one draw takes.
+    draw : callable
+        Takes points of the open unit cube, shape (n, coordinates), and returns values, shape (n, k).
+    """
+
+    coordinates: int
+    draw: Callable[[Floats], Floats]
+
+
 def sobol(
     function: Callable[[Floats], Floats],
-    inputs: Mapping[str, Distribution],
+    inputs: Mapping[str, Distribution | Joint],
     outputs: Sequence[str],
     *,
     points: int = 1024,
@@ -129,9 +145,9 @@ def sobol(
     Parameters
     ----------
     function : callable
-        Takes points, shape (d, M), and returns s quantities at each, shape (s, M).
+        Takes points, shape (d, M), and returns s quantities at each, shape (s, M). An input of k numbers takes k rows.
     inputs : mapping of str to distribution
-        Names of the d inputs, and their distributions.
+        Names of the d inputs, and their distributions; `Joint` where an input is several numbers.
     outputs : sequence of str
         Names of the s quantities.
     points : int
@@ -165,14 +181,19 @@ def sobol(
     if not d or not s:
         raise ScenarioError("inputs" if s else "outputs", "nothing", "at least one name")
     for name, distribution in inputs.items():
-        if not callable(getattr(distribution, "ppf", None)):
+        if not isinstance(distribution, Joint) and not callable(getattr(distribution, "ppf", None)):
             raise ScenarioError(f"inputs[{name!r}]", distribution, "a distribution with a ppf, as scipy.stats has them")
     rng = np.random.Generator(np.random.Philox(as_index("seed", seed, 2**128 - 1)))
-    unit = qmc.Sobol(2 * d, scramble=True, rng=rng).random(n).T
-    values = np.array([_drawn(name, p, unit[[i, d + i]]) for i, (name, p) in enumerate(inputs.items())])
-    a, b = values[:, 0], values[:, 1]
-    mixed = np.repeat(a[np.newaxis], d, axis=0)  # (d, d, n): the i-th matrix has its row i from B
-    mixed[np.arange(d), np.arange(d)] = b
+    axes = np.cumsum([0, *(p.coordinates if isinstance(p, Joint) else 1 for p in inputs.values())])
+    unit = qmc.Sobol(2 * int(axes[-1]), scramble=True, rng=rng).random(n).T.reshape(2, -1, n)
+    values = [
+        _drawn(name, p, unit[:, axes[i] : axes[i + 1]]) for i, (name, p) in enumerate(inputs.items())
+    ]  # of each input in A and in B, (2, k, n)
+    rows = np.cumsum([0, *(value.shape[1] for value in values)])
+    a, b = np.concatenate(values, axis=1)
+    mixed = np.repeat(a[np.newaxis], d, axis=0)  # (d, rows, n): the i-th matrix has the rows of input i from B
+    for i in range(d):
+        mixed[i, rows[i] : rows[i + 1]] = b[rows[i] : rows[i + 1]]
     everything = np.concatenate([a, b, *mixed], axis=1)
     f = _evaluated(function, everything, tuple(outputs)).reshape(s, d + 2, n)
     estimate = _indices(f)
@@ -196,8 +217,10 @@ def sobol(
     )
 
 
-def _drawn(name: str, distribution: Distribution, unit: Floats) -> Floats:
-    """The values of one input, all of them numbers."""
+def _drawn(name: str, distribution: Distribution | Joint, unit: Floats) -> Floats:
+    """The values of one input in A and in B, all of them numbers: (2, k, n) from (2, coordinates, n)."""
+    if isinstance(distribution, Joint):
+        return np.array([distribution.draw(np.ascontiguousarray(points.T)).T for points in unit])
     rule = "a distribution whose ppf gives a number for each entry of an array"
     try:
         values = np.asarray(distribution.ppf(unit), dtype=np.float64)

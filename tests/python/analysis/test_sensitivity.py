@@ -7,8 +7,11 @@ import pytest
 from scipy import stats
 
 import tadcore
+from study_cases import escaping
 from tadcore import ScenarioError
 from tadcore.analysis.sensitivities import sensitivity, sobol
+from tadcore.sampling import Box, Choice, Disk
+from tadcore.statistics.sobol import Joint
 
 CUBE = {name: stats.uniform(-math.pi, 2 * math.pi) for name in ("x1", "x2", "x3")}
 
@@ -118,7 +121,7 @@ def test_games_at_the_points_are_the_games(monkeypatch):
         ({"outputs": ["escaped"]}, "outputs"),
         ({"outputs": []}, "outputs"),
         ({"inputs": {}}, "inputs"),
-        ({"inputs": {"horizon": stats.norm()}}, "input"),
+        ({"inputs": {"interaction": stats.norm()}}, "input"),
         ({"inputs": {"attacker.position.x": 3.0}}, "inputs['attacker.position.x']"),
     ],
 )
@@ -128,3 +131,39 @@ def test_what_makes_no_sense_is_refused(options, name):
     with pytest.raises(ScenarioError) as caught:
         sensitivity(sc, inputs, **options)
     assert caught.value.field == name
+
+
+def test_the_samplers_of_a_study_and_positions_as_a_whole():
+    """A position is one input; with only it and a radius that does not matter varying, it explains everything."""
+    sc = tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": 0.05})
+    study = tadcore.Study(
+        sc, {"attacker.position": Disk([0, 1], 2.0), "d1.visibility_radius": Box(50.0, 60.0)}, trials=1
+    )
+    found = sensitivity(study.scenario, study.vary, points=256, outputs=["intercepted", "time"], resamples=50)
+    assert found.inputs == ("attacker.position", "defenders.0.visibility_radius")
+    assert found.total[0, 1] == pytest.approx(0.0, abs=1e-12)
+    assert found.first[0, 0] == pytest.approx(1.0, abs=0.1)
+    axes = {f"attacker.position.{axis}": Box(-2.0, 3.0) for axis in "xy"}
+    by_axis = sensitivity(sc, axes, points=256, outputs=["time"], resamples=50)
+    same = sensitivity(sc, {name: stats.uniform(-2, 5) for name in axes}, points=256, outputs=["time"], resamples=50)
+    assert by_axis.first.tolist() == same.first.tolist()
+
+
+def test_joint_inputs_of_a_function_that_is_known():
+    """Y = X₁ + X₂ + 2 X₃ with X₁ and X₂ drawn together: 2/6 and 4/6."""
+    pair = Joint(2, lambda points: points - 0.5)
+    found = sobol(lambda x: x[:1] + x[1:2] + 2 * x[2:], {"pair": pair, "one": stats.uniform(0, 1)}, ["y"], points=4096)
+    assert found.first[0] == pytest.approx([1 / 3, 2 / 3], abs=0.01)
+    assert found.total[0] == pytest.approx([1 / 3, 2 / 3], abs=0.01)
+
+
+def test_weights_decide_too():
+    """A game whose horizon decides whether there is an equilibrium, and with it everything."""
+    sc = escaping(3.0)
+    inputs = {"horizon": Choice([2.0, 4.0]), "attacker.target_running_weight": Box(0.0099, 0.0101)}
+    inputs["target.control_weight"] = stats.uniform(0.99, 0.02)
+    found = sensitivity(sc, inputs, points=128, outputs=["no_equilibrium"], resamples=50)
+    assert found.mean[0] == pytest.approx(0.5, abs=0.05)
+    assert found.total[0, 0] == pytest.approx(1.0, abs=0.1)
+    with pytest.raises(ScenarioError, match="a sampler with quantiles"):
+        sensitivity(sc, {"target.position": lambda rng, size: rng.normal(size=(size, 2))}, points=4)
