@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def report(result: Reported, out: str | os.PathLike[str], *, title: str = "", le
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    if not all(hasattr(result, name) for name in ("scenario", "study", "seed", "kind")):
+    if any(inspect.getattr_static(result, name, None) is None for name in ("scenario", "study", "kind")):
         raise ScenarioError("result", result, "a StudyResult, as Study.run and load_study return it")
     if not isinstance(title, str) or not title.isprintable():
         raise ScenarioError("title", title, "one line of text")

@@ -33,6 +33,20 @@ class Reported(TrialOutcomes, Protocol):
         """What was asked for."""
 
 
+MOST_SHOWN = 1 << 20
+"""Trials of which single ones are looked at."""
+
+
+def shown(result: Reported) -> Reported | None:
+    """The trials whose single outcomes are looked at: all, the first of a long study, or none where none is kept."""
+    rows = getattr(result, "rows", None)
+    if rows is not None and not rows.names:
+        return None
+    head: Any = getattr(result, "head", None)
+    few: Reported = result if head is None or result.trials <= MOST_SHOWN else head(MOST_SHOWN)
+    return few
+
+
 @dataclass(frozen=True)
 class Row:
     """A row of a table; a part belongs to the row above it."""

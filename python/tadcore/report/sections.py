@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -13,14 +13,15 @@ import numpy as np
 from tadcore import plotting, statistics
 from tadcore._shared.arrays import Floats
 from tadcore._shared.shares import percent
-from tadcore.game.outcome import NO_EQUILIBRIUM
+from tadcore.game.outcome import NO_EQUILIBRIUM, UNPLAYED
 from tadcore.plotting.tools.axes import for_files
 from tadcore.scenario.paths import short
 from tadcore.scenario.provenance import provenance
+from tadcore.statistics import Incidence
 from tadcore.statistics.outcomes import diverged_of, indicators, is_defender
 from tadcore.statistics.stopping import stopping_of
 
-from .parts import Code, Picture, Reported, Row, Section, Table
+from .parts import Code, Picture, Reported, Row, Section, Table, shown
 
 _INTERVALS = {"wilson": "Wilson intervals", "exact": "exact intervals", "sequence": "confidence sequences"}
 _DPI = 220
@@ -44,8 +45,9 @@ def notes(result: Reported) -> list[str]:
         found.append(
             f"{result.trials:,} of {asked:,} trials are there: the study was stopped or cut off before its end."
         )
-    lost = diverged_of(result)
-    if lost is not None:
+    tally = getattr(result, "tally", None)
+    lost = diverged_of(result) if tally is None else tally.count[tally.diverged]
+    if lost is not None and lost.any():
         found.append(
             f"{int(lost.sum()):,} of {result.trials:,} trials diverged: the players parted without bound, by more than "
             "1000 times the size of their start. They are counted as diverged alone, however they then ended."
@@ -73,14 +75,8 @@ def outcomes(result: Reported, level: float | None) -> Section:
 
 def times(result: Reported, level: float | None) -> Section:
     """The times at which each outcome occurs."""
-    sc = result.scenario
     found = statistics.incidence_of(result, level=level)
-    rows = []
-    played = [name for name in found.names if name != NO_EQUILIBRIUM]
-    for name, ended in zip(played, indicators(result.kind, result.defender, sc.n, diverged_of(result)), strict=True):
-        if ended.any():
-            cells = [f"{t:.6g}" for t in np.quantile(result.time[ended], [0, 0.25, 0.5, 0.75, 1], method="lower")]
-            rows.append(_row(name, cells))
+    rows = [_row(name, [f"{t:.6g}" for t in values]) for name, values in _quartiles(result, found)]
     return Section(
         "Termination times",
         tables=[
@@ -103,27 +99,49 @@ def times(result: Reported, level: float | None) -> Section:
 
 def inputs(result: Reported) -> Section:
     """What varies, and how the outcomes depend on it."""
+    samplers = [Row(path, [repr(sampler)]) for path, sampler in result.study.vary.items()]
+    tables = [Table("Samplers", ["path", "drawn from"], samplers, text=True)]
+    few = shown(result)
+    if few is None:
+        return Section("Inputs", paragraphs=["The study keeps counts alone, and no single trial."], tables=tables)
     rows = [
         Row(name, [f"{cell:.6g}" for cell in (values.min(), _median(values), values.max())])
-        for name, values in result.inputs.items()
+        for name, values in few.inputs.items()
     ]
-    samplers = [Row(path, [repr(sampler)]) for path, sampler in result.study.vary.items()]
-    shown = list(result.inputs)[:_MOST_INPUTS]
-    varying = [name for name in shown if len(np.unique(result.inputs[name][np.isfinite(result.inputs[name])])) > 1]
+    named = list(few.inputs)[:_MOST_INPUTS]
+    varying = [name for name in named if len(np.unique(few.inputs[name][np.isfinite(few.inputs[name])])) > 1]
     figures = []
-    if varying and result.trials >= 10:
-        more = f" (the first {len(shown)} of {len(result.inputs)})" if len(shown) < len(result.inputs) else ""
+    paragraphs = [] if few is result else [f"Values and figures are those of the first {few.trials:,} trials."]
+    if (few.kind == UNPLAYED).any():
+        paragraphs.append("Shares by input are not drawn: some trials have no equilibrium, and were not played.")
+    elif varying and few.trials >= 10:
+        more = f" (the first {len(named)} of {len(few.inputs)})" if len(named) < len(few.inputs) else ""
         caption = f"Shares of the outcomes where each input is in one of ten equally filled ranges{more}."
-        figures.append(_picture(caption, lambda r: plotting.outcomes_by_inputs(r, varying), result, wide=True))
-        figures += _planes(result, varying)
+        figures.append(_picture(caption, lambda r: plotting.outcomes_by_inputs(r, varying), few, wide=True))
+        figures += _planes(few, varying)
     return Section(
         "Inputs",
-        tables=[
-            Table("Samplers", ["path", "drawn from"], samplers, text=True),
-            Table("Values drawn", ["input", "least", "median", "largest"], rows),
-        ],
+        paragraphs=paragraphs,
+        tables=[*tables, Table("Values drawn", ["input", "least", "median", "largest"], rows)],
         figures=figures,
     )
+
+
+def _quartiles(result: Reported, found: Incidence) -> Iterator[tuple[str, Any]]:
+    """The smallest, the quartiles and the largest of the times of every outcome that occurred.
+
+    They are NumPy's "lower" quantiles; where trials are many, or are not kept, at the steps at which they are counted.
+    """
+    shares = np.array([0, 0.25, 0.5, 0.75, 1])
+    if shown(result) is result and NO_EQUILIBRIUM not in found.names:
+        events = indicators(result.kind, result.defender, result.scenario.n, diverged_of(result))
+        for name, ended in zip(found.names, events, strict=True):
+            if ended.any():
+                yield name, np.quantile(result.time[ended], shares, method="lower")
+        return
+    for name, ended in zip(found.names, np.rint(found.estimate * found.trials), strict=True):
+        if ended[-1] and name != NO_EQUILIBRIUM:
+            yield name, found.times[np.searchsorted(ended, np.floor(shares * (ended[-1] - 1)), side="right")]
 
 
 def _planes(result: Reported, varying: list[str]) -> list[Picture]:
@@ -151,11 +169,15 @@ def _median(values: Floats) -> float:
 
 def examples(result: Reported) -> Section:
     """A few trials of each outcome, to be played again."""
+    few, n = shown(result), result.scenario.n
+    if few is None:
+        return Section("Example trials", paragraphs=["The study keeps counts alone, and no single trial."])
+    lost = diverged_of(few)
+    names = statistics.outcome_names(n, diverged=lost is not None)
+    played = few.kind != UNPLAYED
+    events = indicators(np.where(played, few.kind, 0), few.defender, n, lost) & played
     rows = []
-    sc = result.scenario
-    lost = diverged_of(result)
-    events = indicators(result.kind, result.defender, sc.n, lost)
-    for name, ended in zip(statistics.outcome_names(sc.n, diverged=lost is not None), events, strict=True):
+    for name, ended in [*zip(names, events, strict=True), (NO_EQUILIBRIUM, ~played)]:
         first = np.flatnonzero(ended)[:_EXAMPLES]
         if name != "intercepted" and first.size:
             rows.append(_row(name, [", ".join(map(str, first))]))

@@ -95,6 +95,9 @@ def excluding(names: Sequence[str]) -> list[int]:
 
 def diverged_of(result: Any) -> NDArray[np.bool_] | None:
     """Which trials of a study diverged; None where none did, or where the result does not know of divergence."""
+    tally = getattr(result, "tally", None)
+    if tally is not None and not tally.diverged.any():
+        return None  # without a look at the trials, which may be many, or not kept
     lost = getattr(result, "diverged", None)
     return None if lost is None or not np.any(lost) else np.asarray(lost, dtype=np.bool_)
 

@@ -47,6 +47,9 @@ class Rows(Protocol):
     def column(self, name: str) -> NDArray[Any]:
         """One column, in memory."""
 
+    def head(self, trials: int) -> Rows:
+        """The first of them."""
+
     def at(self, row: int) -> pa.Table:
         """One row."""
 
@@ -84,6 +87,10 @@ class InMemory:
         array: NDArray[Any] = self._table[name].to_numpy()
         return array
 
+    def head(self, trials: int) -> InMemory:
+        """The first of them."""
+        return InMemory(self._table.slice(0, trials), self._plan)
+
     def at(self, row: int) -> pa.Table:
         """One row."""
         return self._table.slice(row, 1)
@@ -118,6 +125,10 @@ class InStore:
         """One column."""
         self._refuse(f"the column {name}", [name])
         return np.concatenate([piece[name].to_numpy() for piece in self.pieces()])
+
+    def head(self, trials: int) -> InStore:
+        """The first of them."""
+        return InStore(self._store, min(trials, self.trials))
 
     def at(self, row: int) -> pa.Table:
         """One row."""
@@ -166,6 +177,10 @@ class Counts:
     def column(self, name: str) -> NDArray[Any]:
         """Refuse."""
         raise self._nothing(f"the column {name}")
+
+    def head(self, trials: int) -> Counts:
+        """Refuse."""
+        raise self._nothing("the rows")
 
     def at(self, row: int) -> pa.Table:
         """Refuse."""

@@ -276,6 +276,21 @@ class StudyResult(Trials):
     def _has_inputs(self) -> bool:
         return set(self.study.columns) <= set(self.rows.names)
 
+    def head(self, trials: int) -> StudyResult:
+        """The first trials as a result of their own.
+
+        Parameters
+        ----------
+        trials : int
+            How many; all where there are fewer.
+
+        Raises
+        ------
+        ScenarioError
+            Only counts are kept.
+        """
+        return StudyResult(self.study, self.rows.head(as_index("trials", trials, 2**32, least=1)), self.stopping)
+
     def setup(self, trial: int) -> Scenario:
         """The scenario that one trial played: its positions and radii in place of the common ones.
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tadcore
+from study_cases import calm, escaping
 from tadcore import ScenarioError
 from tadcore.cli.app import main
 from tadcore.report import report
@@ -151,3 +152,25 @@ def test_the_command_writes_the_page(tmp_path, capsys):
     with pytest.raises(SystemExit) as left:
         main(["report", str(store), "--out", str(tmp_path)])
     assert left.value.code == 2
+
+
+@pytest.mark.parametrize("keep", ["all", "outcomes", "counts"])
+def test_a_study_is_reported_whatever_it_keeps(keep, tmp_path, monkeypatch):
+    """Probabilities and quartiles are the same; without single trials, and of very many, the page says so."""
+    wanted = tadcore.Study(calm(), {"attacker.position": Disk([0, 1], 2.0)}, trials=300, seed=7)
+    whole = report(wanted.run(), tmp_path / "whole.html").read_text(encoding="utf-8")
+    page = report(wanted.run(keep=keep), tmp_path / "page.html").read_text(encoding="utf-8")
+    table = re.compile(r"<table.*?</table>", re.DOTALL)
+    assert table.findall(page)[:2] == table.findall(whole)[:2]
+    assert ("keeps counts alone" in page) == (keep == "counts")
+    assert (page == whole) == (keep != "counts")
+    monkeypatch.setattr("tadcore.report.parts.MOST_SHOWN", 100)
+    page = report(wanted.run(keep=keep), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert table.findall(page)[:2] == table.findall(whole)[:2]
+    assert ("those of the first 100 trials" in page) == (keep != "counts")
+
+
+def test_games_without_an_equilibrium_are_reported(tmp_path):
+    wanted = tadcore.Study(escaping(3.0), {"horizon": [2.0, 4.0]}, trials=40, seed=1)
+    page = report(wanted.run(), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("no_equilibrium") >= 2

@@ -41,9 +41,11 @@ class OutcomeLook:
 
 
 def outcome_look(name: str) -> OutcomeLook:
-    """Return how the outcome ``name`` ("timeout", "captured", "intercepted", "diverged", "d1", …) is drawn."""
+    """Return how the outcome ``name`` ("timeout", "captured", "diverged", "no_equilibrium", "d1", …) is drawn."""
     if name == "diverged":
         return OutcomeLook("diverged", "#6A3D9A", (0.36, 0.33, 0.4), "++", "x", (0, (5, 1, 1, 1, 1, 1)))
+    if name == "no_equilibrium":
+        return OutcomeLook("no equilibrium", "#1F78B4", (0.85, 0.9, 0.95), "**", "s", (0, (3, 1, 1, 1)))
     if name == "timeout":
         return OutcomeLook("timeout", "#666666", (0.97, 0.97, 0.97), "", "v", (0, (1, 2.5)))
     if name == "captured":
@@ -65,7 +67,7 @@ def listed(what: str, given: object, known: Sequence[str]) -> str:
 
 def parts_of(names: Sequence[str]) -> list[str]:
     """The outcomes that exclude one another and are certain together: "intercepted" by its defenders."""
-    lost = [name for name in names if name == "diverged"]
+    lost = [name for name in names if name in ("diverged", "no_equilibrium")]
     return [*(name for name in names if is_defender(name)), "captured", "timeout", *lost]
 
 
