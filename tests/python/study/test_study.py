@@ -378,7 +378,7 @@ def test_what_is_no_executor_is_refused():
 def test_a_study_reads_well():
     assert repr(study(5000)) == (
         "Study(5,000 trials of Scenario(I1, 3 defenders, dim=2, T=1, δ=0.05), random, seed 7, "
-        "vary attacker.position, defenders.0.visibility_radius)"
+        "vary attacker.position (Disk), defenders.0.visibility_radius (Box))"
     )
     result = study(100).run()
     ends = result.counts()
