@@ -16,7 +16,8 @@ Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
     with mpi4py.futures.MPIPoolExecutor() as pool:                           # mpiexec -n 64 python -m mpi4py.futures
         study.run(executor=pool, store="out")
 
-Every worker process builds its own table of gains. The store is written by the process that calls `Study.run`.
+Every worker process has its own table of gains, which it reads from the file that ``table`` names. The store is written
+by the process that calls `Study.run`.
 """
 
 from __future__ import annotations

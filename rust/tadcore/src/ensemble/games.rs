@@ -116,7 +116,7 @@ mod tests {
                 Err(EquilibriumError::FiniteEscape { escape_time, .. }) => {
                     assert_eq!(*found, GameEnd::NoEquilibrium { escape_time });
                 }
-                Err(error) => panic!("{error}"),
+                Err(error) => assert_eq!(error.to_string(), "an equilibrium, or its escape"),
             }
         }
         assert!(one.iter().any(|end| matches!(end, GameEnd::NoEquilibrium { .. })), "{one:?}");
