@@ -83,6 +83,9 @@ def stub(trials: int, rounds: int, folder: Path) -> None:
     class Instant:
         """A game whose outcomes are there when they are asked for."""
 
+        def equilibrium(self) -> None:
+            """Nothing to solve."""
+
         def simulate_batch(self, starts: Any, *_: Any, **__: Any) -> tuple[Any, ...]:
             m = len(starts)
             return kind[:m], defender[:m], time_[:m], diverged[:m], diverged[:m]
