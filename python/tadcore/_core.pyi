@@ -54,6 +54,8 @@ class Game:
         evasion_terminal_weight: NDArray[np.float64],
         evasion: float = 1.0,
         synthesis_weights: NDArray[np.float64],
+        prediction_horizon: float | None = None,
+        criterion: Literal["paper", "component"] = "paper",
         table_bytes: int | None = None,
     ) -> Game: ...
     @property
@@ -71,6 +73,8 @@ class Game:
         method: Literal["newton", "descent"] = "newton",
         max_iterations: int | None = None,
     ) -> Gains: ...
+    def theta_price(self, steps: NDArray[np.int64], adjacency: NDArray[np.bool_]) -> NDArray[np.float64]: ...
+    """(L,): Θ under "component" less Θ under "paper", at steps (L,) under adjacency (L, m, N)."""
     def simulate(
         self,
         positions: NDArray[np.float64],
@@ -188,6 +192,9 @@ class Gains:
     @property
     def start(self) -> Literal["canonical", "complex", "stacked", "reversed"]: ...
     """The start that led to the minimum."""
+    @property
+    def restarts_left_out(self) -> int: ...
+    """Restarts that promised to lead lower, beyond those made: in large games their number is limited."""
 
 @final
 class Record:

@@ -25,6 +25,10 @@ _TABLEAU += [
 ]
 
 MUTANTS = {
+    "riccati/condition.rs": [
+        ("a solution that rounding decides", "if «change <= MOST» { found }", "change.is_nan() || true"),
+        ("a change relative to the matrix", "«(x - y) / size»", "(x + y) / size"),
+    ],
     "riccati/coupled.rs": [
         ("I1: S_τ P_τ", "p[1][defenders].map(|x| «x * self.minus_inv_rtau»)", "-x * self.minus_inv_rtau"),
         ("I1: S_a P_a", "row_sums(&p[2][..N]).map(|x| «x * self.minus_inv_ra»)", "-x * self.minus_inv_ra"),
@@ -180,7 +184,7 @@ MUTANTS = {
         ("residual of I2", "«q[i] - psp[i]»", "q[i] + psp[i]"),
         ("residual: S of I2", "«*a - d - tau»", "*a - d + tau"),
         ("residual: differences", "«*x += factor * p;»", "*x -= factor * p;"),
-        ("residual: fresh integration", ".zip(&fresh[g * book.block..]).map(|(a, b)| «a - b»)", "a + b"),
+        ("residual: fresh integration", ".zip(fresh).map(|(a, b)| «a - b»)", "a + b"),
     ],
     "riccati/mod.rs": [
         ("feedback: sign of the team", "*g = «sign * p / r»;", "-sign * p / r"),

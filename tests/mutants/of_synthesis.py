@@ -316,6 +316,7 @@ MUTANTS = {
         ("the paper's descent: step length", "map(|(s, (n, o))| «s * (n - o)»)", "s * (n + o)"),
     ],
     "synthesis/search/candidate.rs": [
+        ("narrow valleys", "self.quick = «self.iterations <= QUICK»;", "self.iterations > QUICK"),
         (
             "a look must win",
             "«self.reached.value - TIE * self.reached.value.abs()»",
@@ -336,7 +337,6 @@ MUTANTS = {
         ("without weight on S: signs", "map(|(g, f)| g * f).sum::<f64>() «< 0.0»", "> 0.0"),
     ],
     "synthesis/search/stages.rs": [
-        ("one row left out", "&candidates[e].initial, &[i], «0.0»,", "1.0"),
         ("back from two parts", "«a + sign * b»", "a + sign + b"),
         ("which doubled gains", "if «doubled.kind(task).0» {", "!doubled.kind(task).0"),
         (
@@ -346,7 +346,22 @@ MUTANTS = {
         ),
         ("where screening got", "«point.copy_from_slice(screened.point(descent));»", "let _ = screened;"),
         ("what screening leaves to be done", "«!screened.pruned(descent)»", "false"),
-        ("narrow valleys", "candidate.quick = «candidate.iterations <= QUICK»;", "candidate.iterations > QUICK"),
+    ],
+    "synthesis/theta/tabled/mod.rs": [
+        ("tables: W_pᵀW_p", "q += «of.gram[i * of.rows + j]»", "-of.gram[i * of.rows + j]"),
+        ("tables: w_jᵀw_i", "|w| «w[j * n + a] * w[i * n + b]»", "w[i * n + a] * w[j * n + b]"),
+        ("tables: −M", "*x = «-t»);", "*t"),
+        ("tables: X holds a pair twice", "if a == b { 1.0 } else { «2.0» }", "1.0"),
+        ("tables: half of the quadratic part", "self.rest + «0.5» * quadratic", "1.0"),
+        (
+            "tables: rows alone",
+            "«part.x[p as usize] - self.x[of as usize]»",
+            "part.x[p as usize] + self.x[of as usize]",
+        ),
+    ],
+    "synthesis/theta/tabled/forms.rs": [
+        ("tables: Gauss–Newton", "h += «factor * self.held[low as usize]»", "-factor * self.held[low as usize]"),
+        ("tables: relative", "if v.differs { h - «v.relative * self.unit»(x", "-v.relative * self.unit"),
     ],
     "synthesis/mod.rs": [
         (

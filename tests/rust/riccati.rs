@@ -422,6 +422,7 @@ fn weights_over_twelve_orders_are_solved_or_refused() -> Fallible {
                         assert!(escape_time > 0.0 && escape_time <= horizon);
                     }
                     Err(EquilibriumError::StepBudget { reached, horizon, .. }) => assert!(reached < horizon),
+                    Err(EquilibriumError::Undetermined { change, .. }) => assert!(change > 1e-5),
                     Err(other) => return Err(other.into()),
                 }
             }

@@ -64,11 +64,15 @@ class Gains:
     status : str
         How the solver ended.
     gradient_norm : float
-        Relative norm of the gradient at the end.
+        Norm of the gradient at the end, relative to the parts that cancel in it. Where these differ more than a
+        hundredfold from player to player, the largest of a player, relative to that player's parts.
     certified : bool
         Whether these gains are proved to be a global minimum of Θ among scalar gains, up to rounding.
     start : {"canonical", "complex", "stacked", "reversed"}
         Starting point of the descent that found it: the canonical one, or a further one of the search.
+    restarts_left_out : int
+        Further starting points that promised to lead lower but were not tried: with more than seven defenders at most
+        twenty-four are tried in each of up to four rounds. 0 elsewhere.
     """
 
     players: tuple[str, ...]
@@ -83,6 +87,7 @@ class Gains:
     gradient_norm: float
     certified: bool
     start: Literal["canonical", "complex", "stacked", "reversed"]
+    restarts_left_out: int = 0
 
     def __repr__(self) -> str:
         state = f"converged in {self.iterations}" if self.converged else f"NOT converged ({self.status})"
@@ -160,4 +165,5 @@ def synthesize(
         gradient_norm=core.gradient_norm,
         certified=core.certified,
         start=core.start,
+        restarts_left_out=core.restarts_left_out,
     )

@@ -77,7 +77,7 @@ pub(crate) fn equilibrium(py: Python<'_>, game: &Game, error: &EquilibriumError)
         EquilibriumError::FiniteEscape { escape_time, horizon } => {
             raise(py, "NoEquilibriumError", (*escape_time, *horizon, game.grid().step()))
         }
-        EquilibriumError::StepBudget { .. } | EquilibriumError::Range => {
+        EquilibriumError::StepBudget { .. } | EquilibriumError::Undetermined { .. } | EquilibriumError::Range => {
             raise(py, "TadcoreError", (error.to_string(),))
         }
         EquilibriumError::Memory(none) => memory(py, *none),

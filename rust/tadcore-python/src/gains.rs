@@ -79,6 +79,12 @@ impl Gains {
         self.gains.certified
     }
 
+    /// Restarts that promised to lead lower, beyond those made: in large games their number is limited.
+    #[getter]
+    fn restarts_left_out(&self) -> usize {
+        self.gains.left_out
+    }
+
     /// The start that led to the minimum: canonical, complex, stacked or reversed.
     #[getter]
     fn start(&self) -> &'static str {

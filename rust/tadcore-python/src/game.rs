@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use numpy::ndarray::Axis;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use tadcore::ensemble::{self, Batch, Between};
-use tadcore::game::{Game as CoreGame, Grid, Interaction, Weights};
+use tadcore::game::{Criterion, Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{self, Chances, Rules, Setup, Termination};
@@ -58,7 +59,7 @@ impl Game {
         attacker_control_weight, defender_running_weight=None, defender_terminal_weight=None,
         target_running_weight=1.0, target_terminal_weight=1.0, attacker_target_running_weight=1.0,
         attacker_target_terminal_weight=1.0, evasion_running_weight, evasion_terminal_weight, evasion=1.0,
-        synthesis_weights, table_bytes=None))]
+        synthesis_weights, prediction_horizon=None, criterion="paper", table_bytes=None))]
     // A keyword for each weight, as the scenario names them.
     #[allow(clippy::too_many_arguments)]
     fn new(
@@ -79,6 +80,8 @@ impl Game {
         evasion_terminal_weight: PyReadonlyArray1<'_, f64>,
         evasion: f64,
         synthesis_weights: PyReadonlyArray1<'_, f64>,
+        prediction_horizon: Option<f64>,
+        criterion: &str,
         table_bytes: Option<usize>,
     ) -> PyResult<Self> {
         guarded(|| {
@@ -104,9 +107,23 @@ impl Game {
                 lambda: evasion,
                 gamma: numbers(Some(synthesis_weights)),
             };
+            let criterion = match criterion {
+                "paper" => Criterion::Paper,
+                "component" => Criterion::Component,
+                other => {
+                    return Err(PyValueError::new_err(format!(
+                        "criterion is {other:?}, but it must be paper or component"
+                    )));
+                }
+            };
             let game = Grid::new(horizon, step)
                 .and_then(|grid| CoreGame::new(interaction, weights, grid))
-                .map_err(|error| errors::game(py, error))?;
+                .and_then(|game| match prediction_horizon {
+                    Some(ahead) => game.receding(ahead),
+                    None => Ok(game),
+                })
+                .map_err(|error| errors::game(py, error))?
+                .with_criterion(criterion);
             Ok(Self { game, table_bytes: table_bytes.unwrap_or(DEFAULT_TABLE_BYTES), generation: Generation::new() })
         })
     }
@@ -175,6 +192,37 @@ impl Game {
             })?
             .map_err(|stopped| errors::stopped(py, stopped))?;
             Ok(Gains::new(gains, terms, topology))
+        })
+    }
+
+    /// Θ under the criterion "component" less Θ under "paper" at t_step for each (step, adjacency): steps (L,),
+    /// adjacency (L, m, N).
+    fn theta_price<'py>(
+        &self,
+        py: Python<'py>,
+        steps: PyReadonlyArray1<'py, i64>,
+        adjacency: PyReadonlyArray3<'py, bool>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        guarded(|| {
+            let (steps, seen) = (steps.as_array(), adjacency.as_array());
+            let (m, n, last) = (self.game.constrained(), self.game.size(), self.game.grid().steps());
+            let instants: Vec<usize> = steps.iter().filter_map(|&k| usize::try_from(k).ok()).collect();
+            if seen.dim() != (steps.len(), m, n) || instants.len() < steps.len() || instants.iter().any(|&k| k > last) {
+                return Err(PyValueError::new_err(format!(
+                    "steps must be from 0 to {last} and adjacency of shape ({}, {m}, {n})",
+                    steps.len()
+                )));
+            }
+            let networks: Vec<Topology> =
+                seen.axis_iter(Axis(0)).map(|seen| Topology::from_fn(m, n, |i, j| seen[(i, j)])).collect();
+            let policy = self.policy(py)?;
+            let prices = detach::interruptible(py, |cancel| {
+                let mut solver = Synthesizer::new();
+                let of = instants.iter().zip(&networks);
+                of.map(|(&k, network)| policy.price(k, network, &mut solver, cancel)).collect::<Result<Vec<f64>, _>>()
+            })?
+            .map_err(|stopped| errors::stopped(py, stopped))?;
+            entries(py, prices.len(), |i| prices[i])
         })
     }
 

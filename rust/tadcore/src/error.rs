@@ -77,6 +77,17 @@ pub enum EquilibriumError {
         /// T.
         horizon: f64,
     },
+    /// Rounding decides the solution.
+    #[error(
+        "the weights lie too far apart for double precision: the Riccati solution changes by {change:.0e} of itself when \
+         the weights change by {nudge:.0e} of themselves"
+    )]
+    Undetermined {
+        /// The largest relative change of a matrix or of the escape time, infinite where only one of two solutions escapes.
+        change: f64,
+        /// The relative change of the weights.
+        nudge: f64,
+    },
     /// The solution left the range of double precision.
     #[error("the Riccati solution leaves the range of double precision: the weights lie too far apart")]
     Range,

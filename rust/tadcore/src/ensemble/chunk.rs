@@ -85,9 +85,9 @@ impl<'a> Chunk<'a> {
             if let Some(watch) = &mut watch {
                 watch.note(&self.trials);
             }
-            let next = (k + 1 < last).then(|| transitions.step_table(k + 1));
-            self.pass(k, &transitions.step_table(k), next.as_deref(), ends, w);
-            drop(next);
+            let tables = transitions.step_tables(k, k + 1 < last);
+            self.pass(k, &tables.now, tables.next(), ends, w);
+            drop(tables);
             lookups += self.trials.blocks.live as u64;
             if !w.waiting.is_empty() {
                 w.missing.sort_unstable();

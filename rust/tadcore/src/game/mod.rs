@@ -46,6 +46,16 @@ impl Interaction {
     }
 }
 
+/// What the gains of the players with limited observations minimise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Criterion {
+    /// T1, the paper's: Θ over the rows of all of them.
+    #[default]
+    Paper,
+    /// T2: who knows everything plays the equilibrium; Θ over the rows of the others.
+    Component,
+}
+
 /// The scalars that define the players' objectives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weights {
@@ -83,6 +93,9 @@ pub struct Game {
     interaction: Interaction,
     weights: Weights,
     grid: Grid,
+    /// The horizon of the prediction as a grid of one step, where it recedes.
+    prediction: Option<Grid>,
+    criterion: Criterion,
 }
 
 impl Game {
@@ -94,7 +107,53 @@ impl Game {
         simd::in_use()?;
         validation::weights(interaction, weights.r_d.len(), &weights)?;
         validation::size(interaction, weights.r_d.len(), grid.steps())?;
-        Ok(Self { interaction, weights, grid })
+        Ok(Self { interaction, weights, grid, prediction: None, criterion: Criterion::Paper })
+    }
+
+    /// The same game under another criterion.
+    #[must_use]
+    pub fn with_criterion(self, criterion: Criterion) -> Self {
+        Self { criterion, ..self }
+    }
+
+    /// The same game with a receding horizon: at every instant the players use P at the beginning of a horizon `ahead`, as
+    /// if the game ended so much later. P is then constant, and it is played up to T all the same.
+    ///
+    /// # Errors
+    /// [`GameError::Value`] when `ahead` is not a positive finite number.
+    pub fn receding(self, ahead: f64) -> Result<Self, GameError> {
+        validation::positive("prediction_horizon", ahead)?;
+        Ok(Self { prediction: Some(Grid::new(ahead, ahead)?), ..self })
+    }
+
+    /// What the gains minimise.
+    #[must_use]
+    pub fn criterion(&self) -> Criterion {
+        self.criterion
+    }
+
+    /// T_h, where the horizon recedes.
+    #[must_use]
+    pub fn prediction_horizon(&self) -> Option<f64> {
+        self.prediction.as_ref().map(Grid::horizon)
+    }
+
+    /// The game that is predicted at every instant, in one step; none where the horizon is the game's own.
+    pub(crate) fn predicted(&self) -> Option<Self> {
+        self.prediction.map(|grid| Self { grid, prediction: None, ..self.clone() })
+    }
+
+    /// The same game with every weight of players changed by at most `part` of itself, in a fixed pattern without symmetry.
+    pub(crate) fn nudged(&self, part: f64) -> Self {
+        let mut weights = self.weights.clone();
+        let w = &mut weights;
+        let lists = [&mut w.r_d, &mut w.q_da, &mut w.f_da, &mut w.q_ad, &mut w.f_ad].into_iter().flatten();
+        let single = [&mut w.r_tau, &mut w.r_a, &mut w.q_atau, &mut w.f_atau, &mut w.q_taua, &mut w.f_taua].into_iter();
+        for (index, x) in lists.chain(single).enumerate() {
+            // The golden angle spreads it.
+            *x *= 1.0 + part * (1.0 + 2.399_963_229_728_653 * index as f64).cos();
+        }
+        Self { weights, ..self.clone() }
     }
 
     /// I1 or I2.

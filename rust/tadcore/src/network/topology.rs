@@ -108,6 +108,12 @@ impl Topology {
         self.sees(i, i)
     }
 
+    /// Whether player i knows everything: it sees everyone.
+    #[must_use]
+    pub fn sees_all(&self, i: usize) -> bool {
+        (0..self.size).all(|j| self.sees(i, j))
+    }
+
     /// The network of the same players under other names: its player i is player `order`\[i] here.
     #[must_use]
     pub fn relabelled(&self, order: &[usize]) -> Self {

@@ -28,7 +28,7 @@ pub(crate) use tadcore_kernels::policy::step_table;
 
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, Stopped, TableError};
-use crate::game::Game;
+use crate::game::{Criterion, Game};
 use crate::memory::{spare, zeros};
 use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
@@ -100,8 +100,10 @@ impl Policy {
         table_bytes: usize,
         cancel: &CancelToken,
     ) -> Result<Self, Stopped> {
-        let steps = game.grid().steps();
-        let (table, budget) = (Table::new(steps + 1, cancel)?, Budget::new(table_bytes));
+        // A constant P makes one instant of all.
+        let steps = if equilibrium.is_constant() { 1 } else { game.grid().steps() };
+        let instants = if equilibrium.is_constant() { 1 } else { steps + 1 };
+        let (table, budget) = (Table::new(instants, cancel)?, Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size(), cancel)?;
         let classes = SymmetryClasses::of(&game);
         Ok(Self { game, equilibrium, classes, budget, table, transitions })
@@ -136,6 +138,32 @@ impl Policy {
     /// The transitions, for ensembles.
     pub(crate) fn transitions(&self) -> &Transitions {
         &self.transitions
+    }
+
+    /// The price of team consistency at (step, topology): how much more Θ is where all who know everything play the
+    /// equilibrium ([`Criterion::Component`]) than at the paper's minimum. Zero where nobody knows everything, or all do.
+    ///
+    /// The rows of the former are allowed to the latter: where the search finds them lower, nothing is paid.
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
+    pub fn price(
+        &self,
+        step: usize,
+        topology: &Topology,
+        solver: &mut Synthesizer,
+        cancel: &CancelToken,
+    ) -> Result<f64, Stopped> {
+        let whole = (0..topology.rows()).filter(|&i| topology.sees_all(i)).count();
+        if whole == 0 || whole == topology.rows() {
+            return Ok(0.0);
+        }
+        solver.watch(cancel);
+        let (problem, canonical) = (self.problem(step, cancel)?, self.classes.canonical(topology).0);
+        let mut theta = |criterion| -> Result<f64, Stopped> {
+            Ok(solver.solve(&problem.clone().under(criterion), &canonical, Options::default())?.theta)
+        };
+        Ok((theta(Criterion::Component)? - theta(Criterion::Paper)?).max(0.0))
     }
 
     /// The synthesis problem at t_k.

@@ -2,14 +2,14 @@
 //!
 //! Little-endian: the magic (8 bytes), the format, N, m, K (u32 each), the length of the game's identity in bytes and the
 //! number of entries (u64 each), the identity, then the entries: step (u64), key (words of u64), exp(Cδ) by columns
-//! (N² f64). The last eight bytes hold the CRC-32 of all before. The identity is every weight, the grid and the version
+//! (N² f64). The last eight bytes hold the CRC-32 of all before. The identity is every weight, the grid, a receding horizon, a criterion other than the paper's and the version
 //! of this crate, since another version may choose other gains.
 
 use super::step_table::padded;
 use super::transitions::Transitions;
 use crate::cancel::CancelToken;
 use crate::error::{Stopped, TableError};
-use crate::game::{Game, Interaction};
+use crate::game::{Criterion, Game, Interaction};
 use crate::memory::{reserve, zeros};
 
 const MAGIC: &[u8; 8] = b"tadtable";
@@ -31,6 +31,14 @@ fn identity(game: &Game) -> Vec<u8> {
     let interaction = u64::from(game.interaction() == Interaction::I1);
     let sizes = [interaction, game.n() as u64, game.grid().steps() as u64];
     let mut out: Vec<u8> = sizes.into_iter().chain(numbers).flat_map(u64::to_le_bytes).collect();
+    // What is as in the paper says nothing, so that its tables are those of former versions.
+    if let Some(ahead) = game.prediction_horizon() {
+        out.extend_from_slice(b"receding");
+        out.extend_from_slice(&ahead.to_bits().to_le_bytes());
+    }
+    if game.criterion() == Criterion::Component {
+        out.extend_from_slice(b"component");
+    }
     out.extend_from_slice(env!("CARGO_PKG_VERSION").as_bytes());
     out.resize(out.len().next_multiple_of(8), 0);
     out
@@ -54,6 +62,8 @@ struct Shape {
     size: usize,
     constrained: usize,
     steps: usize,
+    /// Instants that have entries of their own.
+    instants: usize,
     /// Words of a key.
     words: usize,
     /// Bytes of an entry.
@@ -66,7 +76,8 @@ impl Shape {
         let (size, constrained) = (game.size(), game.constrained());
         let words = (constrained * size).div_ceil(64);
         let (entry, steps) = (8 * (1 + words + size * size), game.grid().steps());
-        Self { size, constrained, steps, words, entry, identity: identity(game) }
+        let instants = if game.prediction_horizon().is_some() { 1 } else { steps };
+        Self { size, constrained, steps, instants, words, entry, identity: identity(game) }
     }
 
     /// The numbers that follow the format.
@@ -81,7 +92,7 @@ impl Shape {
         let mut reader = Reader(entry);
         let step = reader.u64();
         let last = (0..self.words).map(|_| reader.u64()).last().unwrap_or(0);
-        step < self.steps as u64
+        step < self.instants as u64
             && last & beyond == 0
             && (0..self.size * self.size).all(|_| f64::from_bits(reader.u64()).is_finite())
     }
@@ -100,7 +111,7 @@ pub(super) fn write(transitions: &Transitions, game: &Game, cancel: &CancelToken
     out.extend_from_slice(&[0; 8]);
     out.extend_from_slice(&shape.identity);
     let mut count = 0u64;
-    for step in 0..shape.steps {
+    for step in 0..transitions.instants() {
         let table = transitions.step_table(step);
         count += table.len() as u64;
         for (i, key) in table.keys().enumerate() {

@@ -38,6 +38,7 @@ type StepAnswers = RwLock<HashMap<Topology, Arc<StepPolicy>>>;
 /// Answers of the policy by grid instant and topology, within a byte budget.
 #[derive(Debug)]
 pub(super) struct Table {
+    /// One for each instant; one in all where P is constant.
     instants: Vec<StepAnswers>,
     entries: AtomicUsize,
     pub(super) hits: AtomicU64,
@@ -54,6 +55,10 @@ impl Table {
         })
     }
 
+    fn instant(&self, step: usize) -> &StepAnswers {
+        &self.instants[if self.instants.len() == 1 { 0 } else { step }]
+    }
+
     /// The entry, if it is held.
     pub(super) fn get(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
         let found = self.peek(step, topology);
@@ -64,7 +69,7 @@ impl Table {
 
     /// The entry, if it is held, without counting.
     pub(super) fn peek(&self, step: usize, topology: &Topology) -> Option<Arc<StepPolicy>> {
-        self.instants[step].read().unwrap_or_else(PoisonError::into_inner).get(topology).cloned()
+        self.instant(step).read().unwrap_or_else(PoisonError::into_inner).get(topology).cloned()
     }
 
     /// Keeps the entry if the budget allows.
@@ -73,7 +78,7 @@ impl Table {
         if !budget.take(size) {
             return;
         }
-        let mut answers = self.instants[step].write().unwrap_or_else(PoisonError::into_inner);
+        let mut answers = self.instant(step).write().unwrap_or_else(PoisonError::into_inner);
         if answers.insert(topology.clone(), Arc::clone(entry)).is_some() {
             budget.give(size);
         } else {

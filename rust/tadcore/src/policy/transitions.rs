@@ -85,7 +85,7 @@ impl Drop for Claim<'_> {
     }
 }
 
-/// Transitions by grid instant and topology, within a byte budget.
+/// Transitions by grid instant and topology, within a byte budget; by topology alone where P is constant.
 #[derive(Debug)]
 pub(crate) struct Transitions {
     tables: Vec<RwLock<StepTable>>,
@@ -95,6 +95,20 @@ pub(crate) struct Transitions {
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
     entries: AtomicUsize,
+}
+
+/// The tables that one pass reads.
+pub(crate) struct StepTables<'a> {
+    pub now: RwLockReadGuard<'a, StepTable>,
+    after: Option<RwLockReadGuard<'a, StepTable>>,
+    next: bool,
+}
+
+impl StepTables<'_> {
+    /// The table of the next instant, if it was asked for.
+    pub(crate) fn next(&self) -> Option<&StepTable> {
+        self.next.then(|| self.after.as_deref().unwrap_or(&self.now))
+    }
 }
 
 impl Transitions {
@@ -109,24 +123,41 @@ impl Transitions {
         })
     }
 
+    /// Where an instant's entries are.
+    fn at(&self, step: usize) -> usize {
+        if self.tables.len() == 1 { 0 } else { step }
+    }
+
+    /// Instants that have tables of their own.
+    pub(super) fn instants(&self) -> usize {
+        self.tables.len()
+    }
+
     /// The table of an instant, for reading.
     pub(crate) fn step_table(&self, step: usize) -> RwLockReadGuard<'_, StepTable> {
-        self.tables[step].read().unwrap_or_else(PoisonError::into_inner)
+        self.tables[self.at(step)].read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The tables of an instant and, where it has one of its own, of the next: one lock is never held twice.
+    pub(crate) fn step_tables(&self, step: usize, next: bool) -> StepTables<'_> {
+        let own = next && self.at(step) != self.at(step + 1);
+        let after = own.then(|| self.step_table(step + 1));
+        StepTables { now: self.step_table(step), after, next }
     }
 
     /// The largest ‖C‖ among the entries of an instant, or more: infinite for entries from a file.
     pub(crate) fn rate(&self, step: usize) -> f64 {
-        f64::from_bits(self.rates[step].load(Ordering::Relaxed))
+        f64::from_bits(self.rates[self.at(step)].load(Ordering::Relaxed))
     }
 
     /// Notes the ‖C‖ of an entry, at least 0.
     pub(super) fn note_rate(&self, step: usize, rate: f64) {
-        self.rates[step].fetch_max(rate.to_bits(), Ordering::Relaxed);
+        self.rates[self.at(step)].fetch_max(rate.to_bits(), Ordering::Relaxed);
     }
 
     /// What threads are solving at an instant.
     pub(super) fn claims(&self, step: usize) -> &Claims {
-        &self.claims[step]
+        &self.claims[self.at(step)]
     }
 
     /// Whether no thread holds an instant, and none solves an entry.
@@ -160,7 +191,7 @@ impl Transitions {
         matrix: &[f64],
         budget: &Budget,
     ) -> bool {
-        let mut table = self.tables[step].write().unwrap_or_else(PoisonError::into_inner);
+        let mut table = self.tables[self.at(step)].write().unwrap_or_else(PoisonError::into_inner);
         if table.find(words) != 0 {
             return true;
         }

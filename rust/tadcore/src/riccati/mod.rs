@@ -27,10 +27,13 @@
 //! | `weight` | the norm of its error |
 //! | `hamiltonian` | I2: exact steps that cannot jump over a pole |
 //! | `escape` | what counts as an escape, and when it happens |
+//! | `condition` | I1: whether weights that lie far apart determine P |
 //! | `residual` | how well a stored solution satisfies the equations as printed |
 //!
-//! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node.
+//! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node; where weights lie
+//! more than three decades apart, what a change of the weights by a 10⁻¹²th leaves certain, and an error below five digits.
 
+mod condition;
 mod coupled;
 mod dop853;
 mod escape;
@@ -56,6 +59,7 @@ pub struct Equilibrium {
     size: usize,
     steps: usize,
     integrator_steps: usize,
+    /// One node, where the horizon recedes: P is the same at every instant.
     nodes: Vec<f64>,
 }
 
@@ -63,14 +67,20 @@ pub struct Equilibrium {
 ///
 /// # Errors
 /// [`EquilibriumError::FiniteEscape`] when the solution escapes at or before the horizon,
-/// [`EquilibriumError::StepBudget`] when a game is too stiff, [`EquilibriumError::Range`] and [`EquilibriumError::Memory`]
+/// [`EquilibriumError::StepBudget`] when a game is too stiff, [`EquilibriumError::Undetermined`] when its weights lie too
+/// far apart for double precision, [`EquilibriumError::Range`] and [`EquilibriumError::Memory`]
 /// when its numbers or its grid are too large, [`EquilibriumError::Cancelled`] when `cancel` was raised.
 pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, EquilibriumError> {
+    if let Some(predicted) = game.predicted() {
+        let mut solution = solve(&predicted, cancel)?;
+        solution.nodes.truncate(solution.node_len());
+        return Ok(Equilibrium { steps: game.grid().steps(), ..solution });
+    }
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
     let mut nodes = zeros("P on the grid", (steps + 1) * groups(interaction) * size * size)?;
     spare("the solution of the Riccati equations")?;
     let integrator_steps = match interaction {
-        Interaction::I1 => coupled::solve(game, cancel, &mut nodes)?,
+        Interaction::I1 => condition::determined(game, &mut nodes, |game, nodes| coupled::solve(game, cancel, nodes))?,
         Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,
     };
     if interaction == Interaction::I2 && !finite(&nodes) {
@@ -117,14 +127,26 @@ impl Equilibrium {
         self.integrator_steps
     }
 
+    /// Numbers of one node.
+    fn node_len(&self) -> usize {
+        self.groups() * self.size * self.size
+    }
+
+    /// Whether P is the same at every instant, as under a receding horizon.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        self.nodes.len() == self.node_len()
+    }
+
     /// All groups at t_k, (group, i, j).
     ///
     /// # Panics
     /// If `k` > K.
     #[must_use]
     pub fn node(&self, k: usize) -> &[f64] {
-        let len = self.groups() * self.size * self.size;
-        &self.nodes[k * len..(k + 1) * len]
+        assert!(k <= self.steps, "no instant {k} among {}", self.steps + 1);
+        let (len, at) = (self.node_len(), if self.is_constant() { 0 } else { k });
+        &self.nodes[at * len..(at + 1) * len]
     }
 
     /// P of one group at t_k, N × N.
@@ -137,7 +159,7 @@ impl Equilibrium {
         &self.node(k)[group * len..(group + 1) * len]
     }
 
-    /// The whole storage, (k, group, i, j).
+    /// The whole storage, (k, group, i, j); one k where P [is constant](Self::is_constant).
     #[must_use]
     pub fn as_slice(&self) -> &[f64] {
         &self.nodes
@@ -175,7 +197,8 @@ impl Equilibrium {
     /// Where the grid resolves the solution, the derivative is a difference of order 8 of the stored nodes, compared
     /// with the right-hand side of eq:Riccati or eq:RDE evaluated as printed, relative to the norms of its terms. Where
     /// it does not, the node is compared with a fresh integration of the printed equation over one step. At t_K the
-    /// terminal condition is compared as well. About 1e-12 to 1e-9 for a good solution.
+    /// terminal condition is compared as well. About 1e-12 to 1e-9 for a good solution. Under a receding horizon P is
+    /// compared with a fresh integration over that horizon, the same at every node.
     ///
     /// # Errors
     /// [`Stopped`] when there is no memory, or `cancel` was raised.

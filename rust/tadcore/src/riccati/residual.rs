@@ -247,6 +247,9 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game, cancel: &CancelTo
     let (len, step) = (n * n, game.grid().step());
     let mut book = Textbook::new(game, cancel)?;
     let terminal = game.state_weights(true);
+    if let Some(ahead) = game.prediction_horizon() {
+        return receding(&mut book, equilibrium, &terminal, ahead);
+    }
     let weights: [[f64; POINTS]; POINTS] = std::array::from_fn(difference);
     let mut rates = zeros(WHAT, steps + 1)?;
     for (k, rate) in rates.iter_mut().enumerate() {
@@ -257,7 +260,7 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game, cancel: &CancelTo
         let p = node(equilibrium, k);
         let value = book.evaluate(&p)?;
         let stencil = Stencil::about(k, step, &rates);
-        let fresh = if stencil.is_none() && k < steps { again(&mut book, equilibrium, k, step) } else { None };
+        let fresh = if stencil.is_none() && k < steps { again(&mut book, equilibrium.node(k + 1), step) } else { None };
         for g in 0..groups {
             let mut worst = 0.0_f64;
             if let Some(stencil) = &stencil {
@@ -270,8 +273,8 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game, cancel: &CancelTo
                 }
                 worst = norm(&defect) / (value.scale[g] + ROUNDING * norm(p[g]) / (stencil.stride as f64 * step));
             } else if let Some(fresh) = &fresh {
-                let defect: Vec<f64> = p[g].iter().zip(&fresh[g * book.block..]).map(|(a, b)| a - b).collect();
-                worst = norm(&defect) / norm(p[g]).min(step * value.scale[g] + ROUNDING * norm(p[g]));
+                worst = mismatch(p[g], &fresh[g * book.block..])
+                    / norm(p[g]).min(step * value.scale[g] + ROUNDING * norm(p[g]));
             } else if k < steps {
                 worst = f64::INFINITY;
             }
@@ -288,15 +291,42 @@ pub(super) fn residual(equilibrium: &Equilibrium, game: &Game, cancel: &CancelTo
     Ok(out)
 }
 
+/// ‖P − P'‖ for a P' that is padded.
+fn mismatch(p: &[f64], fresh: &[f64]) -> f64 {
+    norm(&p.iter().zip(fresh).map(|(a, b)| a - b).collect::<Vec<f64>>())
+}
+
+/// The residual of a constant P, against the printed equation over the horizon of its prediction.
+fn receding(
+    book: &mut Textbook,
+    equilibrium: &Equilibrium,
+    terminal: &[Vec<f64>],
+    ahead: f64,
+) -> Result<Vec<f64>, Stopped> {
+    let (n, nodes) = (equilibrium.size(), equilibrium.steps() + 1);
+    let mut out = zeros(WHAT, terminal.len() * nodes)?;
+    let mut end = zeros(WHAT, terminal.len() * n * n)?;
+    for (block, f) in end.chunks_exact_mut(n * n).zip(terminal) {
+        f.iter().enumerate().for_each(|(i, f)| block[i * n + i] = *f);
+    }
+    let fresh = again(book, &end, ahead);
+    book.cancel.check()?;
+    for (g, out) in out.chunks_exact_mut(nodes).enumerate() {
+        let p = equilibrium.p(g, 0);
+        out.fill(fresh.as_ref().map_or(f64::INFINITY, |fresh| mismatch(p, &fresh[g * book.block..]) / norm(p)));
+    }
+    Ok(out)
+}
+
 fn node(equilibrium: &Equilibrium, k: usize) -> Vec<&[f64]> {
     (0..equilibrium.groups()).map(|g| equilibrium.p(g, k)).collect()
 }
 
-/// P at t_k from the stored P at t_{k+1}, as a padded stack.
-fn again(book: &mut Textbook, equilibrium: &Equilibrium, k: usize, step: f64) -> Option<Vec<f64>> {
-    let len = equilibrium.size() * equilibrium.size();
-    let mut y = vec![0.0; equilibrium.groups() * book.block];
-    for (block, p) in y.chunks_exact_mut(book.block).zip(equilibrium.node(k + 1).chunks_exact(len)) {
+/// P a time `step` before the matrices `p`, as a padded stack.
+fn again(book: &mut Textbook, p: &[f64], step: f64) -> Option<Vec<f64>> {
+    let len = book.n * book.n;
+    let mut y = vec![0.0; p.len() / len * book.block];
+    for (block, p) in y.chunks_exact_mut(book.block).zip(p.chunks_exact(len)) {
         block[..len].copy_from_slice(p);
     }
     let mut last = None;

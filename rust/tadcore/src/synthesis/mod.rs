@@ -40,7 +40,7 @@ use crate::cancel::CancelToken;
 use crate::error::Stopped;
 use crate::memory::zeros;
 use crate::network::Topology;
-use newton::{Limits, Tasks};
+use newton::{Limits, Tasks, Workspace};
 use search::{Candidate, Dispatcher, Search};
 
 /// How the gains are computed.
@@ -90,7 +90,8 @@ pub struct Gains {
     pub rows: Vec<f64>,
     /// Θ, reduced.
     pub theta: f64,
-    /// Norm of the gradient with respect to the variables, relative to the parts that cancel in it.
+    /// Norm of the gradient with respect to the variables, relative to the parts that cancel in it. Where these parts
+    /// differ more than a hundredfold from player to player, the largest of a player, relative to that player's parts.
     pub gradient_norm: f64,
     /// Iterations of all descents together.
     pub iterations: usize,
@@ -100,6 +101,8 @@ pub struct Gains {
     pub certified: bool,
     /// The start whose descent won.
     pub start: Start,
+    /// Restarts that promised to lead lower, beyond those made: in large games their number is limited.
+    pub left_out: usize,
 }
 
 impl Gains {
@@ -122,6 +125,7 @@ pub struct Synthesizer {
     dispatcher: Dispatcher,
     tasks: Tasks,
     doubled: Tasks,
+    workspace: Workspace<f64>,
 }
 
 impl Synthesizer {
@@ -171,17 +175,22 @@ impl Synthesizer {
         for topology in topologies {
             let mut start = zeros("the gains of one network", problem.rows * problem.size)?;
             search::canonical(problem, topology, &mut start);
-            let candidate = Candidate::new(search::variables(topology)?, start)?;
+            let candidate = Candidate::new(
+                search::variables(topology, problem.criterion)?,
+                start,
+                problem.size,
+                topology.is_complete(),
+            )?;
             search::admit(&candidate)?;
             candidates.push(candidate);
         }
-        let Self { dispatcher, tasks, doubled } = self;
-        let mut search = Search { problem, limits, dispatcher, tasks, doubled };
+        let Self { dispatcher, tasks, doubled, workspace } = self;
+        let mut search = Search { problem, limits, dispatcher, tasks, doubled, workspace };
         match options.method {
             Method::Newton => search.run(&mut candidates)?,
             Method::Descent => {
                 for (candidate, topology) in candidates.iter_mut().zip(topologies) {
-                    let variables = search::paper_variables(topology);
+                    let variables = search::paper_variables(topology, problem.criterion);
                     let cancel = search.dispatcher.cancel();
                     candidate.reached = search::descend(problem, &mut candidate.g, &variables, limits, cancel)?;
                     candidate.iterations = candidate.reached.iterations;
@@ -202,6 +211,7 @@ impl Synthesizer {
                     status: candidate.reached.status,
                     certified: candidate.certified && candidate.reached.status == Status::Converged,
                     start: candidate.start,
+                    left_out: candidate.left_out,
                 },
             )?;
         }

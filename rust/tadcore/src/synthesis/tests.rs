@@ -10,6 +10,7 @@ mod descents;
 mod moves;
 mod single;
 mod starts;
+mod tabled;
 mod weights;
 
 fn check(objective: &mut impl Objective<f64>, g: &[f64]) {

@@ -22,7 +22,7 @@ mod tile;
 mod variables;
 mod workspace;
 
-pub use factor::{Backend, factorise, forward};
+pub use factor::{Backend, back, factorise, forward};
 pub use layout::packed;
 pub use layout::{Form, Layout, Slot};
 pub use minimise::{minimise, unknowns};

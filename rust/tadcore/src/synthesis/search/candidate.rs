@@ -3,7 +3,7 @@
 use crate::error::NoMemory;
 use crate::memory::copy;
 use crate::simd::norm;
-use crate::synthesis::newton::{Incumbent, Owner, Reached, Variable};
+use crate::synthesis::newton::{Incumbent, Owner, Reached, Variable, balance};
 
 /// The start whose descent won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,9 +24,15 @@ pub(crate) const BACK: f64 = 1e-3;
 /// How much lower, relatively, a restart must lead to win.
 pub(crate) const TIE: f64 = 1e-9;
 
+/// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
+/// of them mean a narrow valley, whose floor is worth following to its end.
+const QUICK: usize = 30;
+
 /// One network at the instant: its variables, and the best gains found so far.
 #[derive(Debug)]
 pub(crate) struct Candidate {
+    /// N.
+    size: usize,
     pub variables: Vec<Variable>,
     pub initial: Vec<f64>,
     pub g: Vec<f64>,
@@ -40,13 +46,20 @@ pub(crate) struct Candidate {
     /// Whether every constrained player sees everyone. The canonical start is then the equilibrium, where Θ, a sum of
     /// squares, is zero: the global minimum, and nothing is left to be done.
     pub complete: bool,
+    /// Restarts of a large game that promised to lead lower, beyond those made.
+    pub left_out: usize,
 }
 
 impl Candidate {
-    /// A network that starts from `start`.
-    pub(crate) fn new(variables: Vec<Variable>, start: Vec<f64>) -> Result<Self, NoMemory> {
-        let complete = variables.len() == start.len();
+    /// A network of N = `size` that starts from `start`; `complete` says whether every constrained player sees everyone in it.
+    pub(crate) fn new(
+        variables: Vec<Variable>,
+        start: Vec<f64>,
+        size: usize,
+        complete: bool,
+    ) -> Result<Self, NoMemory> {
         Ok(Self {
+            size,
             variables,
             complete,
             g: copy("the gains of one network", &start)?,
@@ -56,12 +69,32 @@ impl Candidate {
             certified: false,
             iterations: 0,
             quick: false,
+            left_out: 0,
         })
+    }
+
+    /// Notes, after the first descent, whether later ones may end early.
+    pub(crate) fn note_quick(&mut self) {
+        self.quick = self.iterations <= QUICK;
     }
 
     pub(crate) fn owner(&self) -> Owner<'_> {
         let incumbent = Incumbent { g: &self.g, value: self.reached.value, near: BACK * norm(&self.g) };
         Owner { variables: &self.variables, incumbent: self.quick.then_some(incumbent) }
+    }
+
+    /// Makes a point of single precision one of this network again: rows that know differences only sum to zero, and rows
+    /// without a variable are those of the start.
+    pub(crate) fn in_double(&self, point: &mut [f64]) {
+        balance(point, &self.variables);
+        let n = self.size;
+        let mut variables = self.variables.iter().map(|v| v.entry / n).peekable();
+        for (i, (row, initial)) in point.chunks_exact_mut(n).zip(self.initial.chunks_exact(n)).enumerate() {
+            if variables.peek() != Some(&i) {
+                row.copy_from_slice(initial);
+            }
+            while variables.next_if_eq(&i).is_some() {}
+        }
     }
 
     /// Keeps what a descent of `start` reached.

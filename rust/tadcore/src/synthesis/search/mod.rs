@@ -5,11 +5,13 @@
 //!    random networks, about four in five at n = 3 and three in five at n = 5).
 //! 2. Otherwise two restarts: a descent in complex gains and one in stacked gains, both from the canonical start with a
 //!    fixed pattern of a second part B as large as the gains. Each descends without long jumps between basins and comes
-//!    back to the real gains A, A + B and A − B, from where Newton finishes. (Of more than eight players, also from the
-//!    canonical start without one row at a time.)
+//!    back to the real gains A, A + B and A − B, from where Newton finishes.
 //! 3. Further restarts: Newton from the best point with rows and gains reversed, and rows exchanged, again while that goes
 //!    lower: GᵀRG sees neither the sign of a row of √R·G nor whose it is, so minima come in families (`moves`).
-//! 4. Without weight on S minima need not be unique: which of equal ones is taken (`settle`).
+//! 4. Where the parts of Θ differ by decades from player to player, Newton to the end for each of them (`refine`).
+//! 5. Without weight on S minima need not be unique: which of equal ones is taken (`settle`).
+//!
+//! Games of N > 8 have a search of their own with the same stages, whose restarts a model of Θ chooses (`large`).
 //!
 //! Most restarts lead back to the best point or to a higher one. Where descents go side by side they are made in single
 //! precision first, twice as many to a register, and what that leaves undecided goes on in double from there; doubled
@@ -31,11 +33,15 @@
 //! | `gradient` | the paper's gradient descent, as a second method |
 //! | `moves` | restarts from the best point: rows and gains reversed, rows exchanged |
 //! | `stages` | the stages above |
+//! | `large` | the same for large games |
+//! | `refine` | the end of the search where players differ by decades |
 //! | `settle` | which of equal minima is taken where S has no weight |
 
 mod candidate;
 mod gradient;
+mod large;
 mod moves;
+mod refine;
 mod settle;
 mod stages;
 mod start;

@@ -15,10 +15,8 @@ use crate::error::Stopped;
 use crate::simd::{norm, sum_of_squares};
 use crate::synthesis::theta::Problem;
 
-/// Constrained players up to which rows change places; beyond, one row at a time is reversed.
-pub(super) const CHANGE_UP_TO: usize = 8;
 /// The part of a row that its taker must keep.
-const KEPT: f64 = 0.7;
+pub(super) const KEPT: f64 = 0.7;
 /// The least size of a row taken and of a gain reversed, relative to H.
 const ROW: f64 = 0.3;
 const GAIN: f64 = 0.3;
@@ -60,9 +58,7 @@ impl<'a> Moves<'a> {
         players.dedup();
         let mut moves =
             Self { problem, candidate, n, root, h, size, x: Vec::new(), e: Vec::new(), close: 0.0, players };
-        if problem.rows <= CHANGE_UP_TO {
-            moves.evaluate();
-        }
+        moves.evaluate();
         moves
     }
 
@@ -175,12 +171,8 @@ impl<'a> Moves<'a> {
         }
         let (n, m, always) = (self.n, self.problem.rows, f64::INFINITY);
         let (mut scratch, add) = (Vec::new(), &mut add);
-        let many = m > CHANGE_UP_TO;
         for &i in self.players.iter().filter(|&&i| norm(self.row(i)) > 0.0) {
-            self.near(&[(i, self.row(i), -1.0)], if many { always } else { REVERSED }, &mut scratch, add)?;
-        }
-        if many {
-            return Ok(());
+            self.near(&[(i, self.row(i), -1.0)], REVERSED, &mut scratch, add)?;
         }
         // Row j as i takes it, and its size.
         let mut all = vec![0.0; m * m * n];

@@ -2,11 +2,12 @@
 
 use super::candidate::{BACK, Candidate, Start};
 use super::dispatch::{self, Dispatcher, Kind};
-use super::moves::{CHANGE_UP_TO, Moves};
+use super::large;
+use super::moves::Moves;
 use crate::error::{NoMemory, Stopped};
 use crate::memory;
 use crate::simd::norm;
-use crate::synthesis::newton::{Limits, Owner, Tasks, advance, balance};
+use crate::synthesis::newton::{Limits, Owner, Tasks, Workspace, advance};
 use crate::synthesis::theta::Problem;
 
 /// Size of the second part B at the start, relative to ‖F‖.
@@ -21,10 +22,7 @@ pub(crate) const DOUBLED_ITERATIONS: usize = 300;
 const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
 /// Rounds of moves, each from the best point of the one before.
-const ROUNDS: usize = 4;
-/// Iterations of the first descent up to which later ones may end early, back at the best point or unable to win: more
-/// of them mean a narrow valley, whose floor is worth following to its end.
-const QUICK: usize = 30;
+pub(super) const ROUNDS: usize = 4;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
 
@@ -52,6 +50,8 @@ pub(crate) struct Search<'a> {
     pub tasks: &'a mut Tasks,
     /// A list to spare: descents in doubled gains when they are done, and those in single precision.
     pub doubled: &'a mut Tasks,
+    /// Scratch of descents in large games.
+    pub workspace: &'a mut Workspace<f64>,
 }
 
 impl Search<'_> {
@@ -61,12 +61,21 @@ impl Search<'_> {
         self.limits.iterations = 0;
         self.first(Kind::Real, candidates, true)?;
         self.limits = limits;
+        if large::is_large(self.problem) {
+            for candidate in candidates.iter_mut().filter(|candidate| !candidate.complete) {
+                self.run_large(candidate)?;
+            }
+            self.polish(candidates)?;
+            self.refine(candidates)?;
+            return self.settle(candidates);
+        }
         self.first(Kind::Certified, candidates, false)?;
         let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].certified).collect();
         if !open.is_empty() {
             self.restart(candidates, &open)?;
         }
         self.polish(candidates)?;
+        self.refine(candidates)?;
         self.settle(candidates)
     }
 
@@ -82,7 +91,7 @@ impl Search<'_> {
             candidate.take(Start::Canonical, self.tasks.point(task), reached);
             candidate.iterations = reached.iterations;
             candidate.certified = complete || self.tasks.certified(task);
-            candidate.quick = candidate.iterations <= QUICK;
+            candidate.note_quick();
         }
         Ok(())
     }
@@ -148,9 +157,8 @@ impl Search<'_> {
         self.dispatcher.run(kind, &self.problem.theta, self.tasks, &owners, self.limits)
     }
 
-    /// Descends in doubled gains, and lists the restarts that come of it and those without one row; the kind of start
-    /// of each.
-    fn double(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Result<Vec<Start>, Stopped> {
+    /// Descends in doubled gains, and lists the restarts that come of it; the kind of start of each.
+    pub(super) fn double(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Result<Vec<Start>, Stopped> {
         let (n, m) = (self.problem.size, self.problem.rows);
         let scale = self.problem.theta.double.scale.fne;
         self.begin(2);
@@ -185,14 +193,8 @@ impl Search<'_> {
                 for (x, (a, b)) in point.iter_mut().zip(a.iter().zip(b)) {
                     *x = a + sign * b;
                 }
-                balance(point, &candidates[e].variables);
+                candidates[e].in_double(point);
                 starts.push(start);
-            }
-            if start == Start::Stacked && m > CHANGE_UP_TO {
-                for i in 0..m {
-                    scale_rows(n, &candidates[e].initial, &[i], 0.0, self.tasks.add(e, false, 0.0)?);
-                    starts.push(Start::Reversed);
-                }
             }
         }
         *self.doubled = doubled;
@@ -220,7 +222,7 @@ impl Search<'_> {
                 candidate.iterations += screened.reached(descent).iterations;
                 let point = tasks.point_mut(task);
                 point.copy_from_slice(screened.point(descent));
-                balance(point, &candidate.variables);
+                candidate.in_double(point);
                 !screened.pruned(descent)
             })
             .collect();
@@ -265,14 +267,6 @@ impl Search<'_> {
             candidates[self.tasks.owner(task)].certified = self.tasks.certified(task);
         }
         Ok(())
-    }
-}
-
-/// Writes the gains with the named rows times `factor`.
-fn scale_rows(n: usize, from: &[f64], rows: &[usize], factor: f64, out: &mut [f64]) {
-    out.copy_from_slice(from);
-    for &i in rows {
-        out[i * n..(i + 1) * n].iter_mut().for_each(|x| *x *= factor);
     }
 }
 

@@ -8,18 +8,20 @@
 //! alone. It depends on (t_k, topology) and on nothing else.
 
 use crate::error::NoMemory;
+use crate::game::Criterion;
 use crate::memory::reserve;
 use crate::network::Topology;
 use crate::synthesis::newton::Variable;
 use crate::synthesis::theta::Problem;
 
-/// The variables of `topology`, row by row.
-pub(crate) fn variables(topology: &Topology) -> Result<Vec<Variable>, NoMemory> {
+/// The variables of `topology`, row by row. Under [`Criterion::Component`] who knows everything has none: the canonical
+/// start is the equilibrium's row there, and it stays.
+pub(crate) fn variables(topology: &Topology, criterion: Criterion) -> Result<Vec<Variable>, NoMemory> {
     // At most all that are seen and, in each row, the player itself.
     let mut out = Vec::new();
     reserve("the unknowns of one network", &mut out, topology.edges() + topology.rows())?;
     let n = topology.size();
-    for i in 0..topology.rows() {
+    for i in (0..topology.rows()).filter(|&i| is_free(topology, i, criterion)) {
         let own = i * n + i;
         let relative = !topology.sees_attacker(i);
         for j in (0..n).filter(|&j| j == i || topology.sees(i, j)) {
@@ -31,11 +33,16 @@ pub(crate) fn variables(topology: &Topology) -> Result<Vec<Variable>, NoMemory> 
     Ok(out)
 }
 
+/// Whether the criterion leaves row i to be chosen.
+fn is_free(topology: &Topology, i: usize, criterion: Criterion) -> bool {
+    criterion == Criterion::Paper || !topology.sees_all(i)
+}
+
 /// The paper's own variables, the entries of K_i: e_j − e_i for each player seen, e_i when the attacker is seen.
-pub(crate) fn paper_variables(topology: &Topology) -> Vec<Variable> {
+pub(crate) fn paper_variables(topology: &Topology, criterion: Criterion) -> Vec<Variable> {
     let mut out = Vec::new();
     let n = topology.size();
-    for i in 0..topology.rows() {
+    for i in (0..topology.rows()).filter(|&i| is_free(topology, i, criterion)) {
         for j in (0..n).filter(|&j| topology.sees(i, j)) {
             out.push(Variable { entry: i * n + j, own: i * n + i, relative: j != i });
         }

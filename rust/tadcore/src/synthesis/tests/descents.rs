@@ -4,6 +4,7 @@
 use super::super::newton::{Backend, Form, Incumbent, Owner, Reached, Slot, Workspace, advance, minimise};
 use super::super::search::{canonical, variables};
 use super::*;
+use crate::game::Criterion;
 use crate::simd::norm;
 
 pub(super) const BACKEND: Backend<'static> = Backend { library: false, width: Width::Baseline, cancel: None };
@@ -110,7 +111,7 @@ pub(super) fn each(mut visit: impl FnMut(&Problem, &[Variable], &[f64])) {
             let topology = Topology::from_key(m, n, key);
             let mut g = vec![0.0; m * n];
             canonical(&problem, &topology, &mut g);
-            visit(&problem, &variables(&topology).expect("memory"), &g);
+            visit(&problem, &variables(&topology, Criterion::Paper).expect("memory"), &g);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::super::search::{Candidate, Moves, canonical, variables};
 use super::*;
 use crate::cancel::CancelToken;
-use crate::game::bank;
+use crate::game::{Criterion, bank};
 use crate::riccati;
 
 /// Θ of changed rows by its terms, and no start that uses what its player does not see.
@@ -19,7 +19,9 @@ fn starts_are_admissible_and_their_theta_is_that_of_its_terms() {
         let topology = Topology::from_fn(m, n, |i, j| (3 * i + 2 * j + i * j) % 4 != 1);
         let mut start = vec![0.0; m * n];
         canonical(&problem, &topology, &mut start);
-        let mut candidate = Candidate::new(variables(&topology).expect("memory"), start).expect("memory");
+        let mut candidate =
+            Candidate::new(variables(&topology, Criterion::Paper).expect("memory"), start, problem.size, false)
+                .expect("memory");
         let theta = |g: &[f64]| problem.weigh(&problem.terms(p, g, &cancel).expect("memory"));
         candidate.reached.value = 1e9;
         let moves = Moves::new(&problem, &candidate);

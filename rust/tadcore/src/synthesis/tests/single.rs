@@ -4,6 +4,7 @@ use super::super::newton::{Incumbent, Owner, Workspace, balance, minimise};
 use super::super::search::variables;
 use super::descents::{BACKEND, LIMITS, descend, each};
 use super::*;
+use crate::game::Criterion;
 use crate::simd::norm;
 
 /// Whether single precision prunes a descent from `start` beside an incumbent, and in how many steps it ends.
@@ -111,6 +112,6 @@ fn out_of_range_everything_is_done_in_double() {
 fn rows_are_balanced() {
     let topology = Topology::from_words(2, 3, &[0b010_110]);
     let mut g = vec![9.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-    balance(&mut g, &variables(&topology).expect("memory"));
+    balance(&mut g, &variables(&topology, Criterion::Paper).expect("memory"));
     assert_eq!(g, [-5.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
 }

@@ -5,13 +5,15 @@ use super::super::search::{
     BASIN, Candidate, DOUBLED_ITERATIONS, Dispatcher, Kind, LONGEST_STEP, canonical, far_start, variables,
 };
 use super::*;
+use crate::game::Criterion;
 
 /// The lowest Θ that descents in complex gains, or in stacked ones, lead to from the far start.
 fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
     let (dispatcher, tasks) = (&mut Dispatcher::default(), &mut Tasks::default());
     let mut start = vec![0.0; problem.rows * problem.size];
     canonical(problem, topology, &mut start);
-    let candidate = Candidate::new(variables(topology).expect("memory"), start).expect("memory");
+    let candidate = Candidate::new(variables(topology, Criterion::Paper).expect("memory"), start, problem.size, false)
+        .expect("memory");
     let owners = [Owner { variables: &candidate.variables, incumbent: None }];
     let fine = Limits { iterations: 2_000, tolerance: 1e-12, acceptable: 1e-10, longest: f64::INFINITY };
     let scale = problem.theta.double.scale.fne;

@@ -8,10 +8,13 @@
 //! | `problem` | the same from a game and its Riccati matrices |
 //! | `real` | Θ over the gains, and the certificate of a global minimum |
 //! | `doubled` | Θ over twice as many gains, complex or stacked |
+//! | `tabled` | Θ over the gains of one network of a large game |
 
 mod problem;
+mod tabled;
 
 pub use problem::Problem;
+pub(crate) use tabled::{Scratch, Tabled, TabledCertificate, TabledParts};
 #[cfg(test)]
 pub(crate) use tadcore_kernels::synthesis::theta::Doubled;
 pub(crate) use tadcore_kernels::synthesis::theta::{Coefficients, Precisions, RealGains, Scale, TABULATED_UP_TO};

@@ -17,7 +17,7 @@
 use super::{Coefficients, Precisions, Scale, TABULATED_UP_TO};
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
-use crate::game::{Game, Interaction};
+use crate::game::{Criterion, Game, Interaction};
 use crate::memory::{copy, zeros};
 use crate::simd::{norm, sum_of_squares};
 
@@ -30,6 +30,8 @@ pub struct Problem {
     pub(crate) interaction: Interaction,
     pub(crate) size: usize,
     pub(crate) rows: usize,
+    /// Whether who knows everything plays the equilibrium.
+    pub(crate) criterion: Criterion,
     pub(crate) gamma: Vec<f64>,
     /// γ is 2^`exponent` times what `theta` is made with.
     exponent: i32,
@@ -44,10 +46,16 @@ impl Problem {
     /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
     pub fn new(game: &Game, p: &[f64], cancel: &CancelToken) -> Result<Self, Stopped> {
         let (r, gamma) = (game.constrained_control_weights(), game.weights().gamma.clone());
-        Self::from_parts(game.interaction(), r, gamma, p, cancel)
+        Ok(Self::from_parts(game.interaction(), r, gamma, p, cancel)?.under(game.criterion()))
     }
 
-    /// The same from its parts: control weights of the constrained players, γ and the Riccati matrices.
+    /// The same problem under another criterion.
+    #[must_use]
+    pub fn under(self, criterion: Criterion) -> Self {
+        Self { criterion, ..self }
+    }
+
+    /// The same from its parts, under the paper's criterion: control weights of the constrained players, γ and the Riccati matrices.
     ///
     /// # Errors
     /// [`Stopped`] when there is no memory for it, or `cancel` was raised.
@@ -127,7 +135,7 @@ impl Problem {
         let first = scaled[0];
         let double =
             Coefficients { size, rows, first, strength, r, fne, target, coupling, gram, closeness, quadratic, scale };
-        Ok(Self { interaction, size, rows, gamma, exponent, theta: double.into() })
+        Ok(Self { interaction, size, rows, criterion: Criterion::Paper, gamma, exponent, theta: double.into() })
     }
 
     /// A value of `theta` in the scale of γ.
