@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tadcore._shared.calls import public
+from tadcore._shared.text import one_of
+from tadcore.errors import ScenarioError
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes
@@ -57,18 +59,15 @@ def compare(
     as_run(run_a, "run_a")
     as_run(run_b, "run_b")
     if run_a.scenario.players != run_b.scenario.players:
-        raise ValueError(
-            f"the runs have different players: {', '.join(run_a.scenario.players)} and "
-            f"{', '.join(run_b.scenario.players)}"
-        )
+        theirs = f"a run of {', '.join(run_b.scenario.players)}"
+        raise ScenarioError("run_b", theirs, f"one of the same players: {', '.join(run_a.scenario.players)}")
+    one_of("what", what, ("trajectories", "controls", "distances"))
     run_a, run_b = until_divergence(run_a), until_divergence(run_b)
     names = names or _names(run_a, run_b)
     if _full(run_a) and not _full(run_b):
         run_a, run_b, names = run_b, run_a, names[::-1]
     if what == "trajectories":
         return trajectories(run_a, ax, full=run_b, names=names)
-    if what not in ("controls", "distances"):
-        raise ValueError(f'what: got {what!r}, must be "trajectories", "controls" or "distances"')
     if what == "controls":
         known_axis(run_a, axis)
     ax = new_axes(ax, COLUMN, 2.5)

@@ -66,6 +66,19 @@ def paths(ax: Axes, run: Recorded, *, dashed: bool, marks: Floats | None = None)
         _heading(ax, path, it.colour)
 
 
+def drops(ax: Axes, run: Recorded, floor: float) -> None:
+    """In space, the shadow of every path on the floor, and a line down from where it starts and from where it ends."""
+    for p, player in enumerate(run.scenario.players):
+        path, colour = run.position[:, p], look(player).colour
+        shadow = path.copy()
+        shadow[:, 2] = floor
+        ax.plot(*shadow.T, color=colour, linewidth=0.7, alpha=0.35, zorder=1.0)
+        for k in (0, -1):
+            ax.plot(
+                *np.array([path[k], shadow[k]]).T, color=colour, linewidth=0.5, linestyle=":", alpha=0.7, zorder=1.0
+            )
+
+
 def name_runs(ax: Axes, names: tuple[str, str]) -> None:
     """Say above the axes which run is solid and which is dashed, below one another where the names are long."""
     handles = [
@@ -128,10 +141,10 @@ def disc(ax: Axes, run: Recorded, *, dashed: bool) -> None:
     radius = float(run.scenario.capture_radii[winner])
     colour = look(names[winner]).colour
     if len(centre) == 3:
-        u, v = np.mgrid[0 : 2 * np.pi : 19j, 0 : np.pi : 10j]
+        u, v = np.mgrid[0 : 2 * np.pi : 37j, 0 : np.pi : 19j]
         ball = [np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)]
-        ax.plot_wireframe(  # type: ignore[attr-defined]
-            *(c + radius * b for c, b in zip(centre, ball, strict=True)), color=colour, linewidth=0.3, alpha=0.6
+        ax.plot_surface(  # type: ignore[attr-defined]
+            *(c + radius * b for c, b in zip(centre, ball, strict=True)), color=colour, linewidth=0.0, alpha=0.3
         )
         return
     style = {"linestyle": (0, (3, 2))} if dashed else {}

@@ -17,7 +17,7 @@ from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
 
-from .paths import count_passes, disc, name_runs, passes, paths
+from .paths import count_passes, disc, drops, name_runs, passes, paths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,8 @@ def trajectories(
     r"""Draw the paths of all players, in 3-D axes when the game is in space.
 
     A hollow marker is where a player starts, a filled one where it stands when the game ends. A crossed circle is where
-    the attacker was within a capture radius between two instants, which ends nothing.
+    the attacker was within a capture radius between two instants, which ends nothing. In space, paths have a shadow on
+    the floor of the box, and dotted lines lead down to it from where they start and end.
 
     Parameters
     ----------
@@ -102,6 +103,8 @@ def trajectories(
         passes(where, run)
 
     draw(ax, marked=True)
+    if dim == 3:
+        drops(ax, run, float(low[2]))
     _limits(ax, dim, low, high)
     ends = np.concatenate([r.position[-1] for r in shown])
     crowded = crowd(ax, ends, low, high) if zoom and dim == 2 else None
@@ -138,7 +141,7 @@ def _limits(ax: Axes, dim: int, low: Floats, high: Floats) -> None:
     ax.set(xlabel="$x$", ylabel="$y$")
     if dim == 3:
         ax.set(zlabel="$z$", xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        ax.set_box_aspect(tuple(high - low), zoom=1.0)  # type: ignore[arg-type, call-arg]
+        ax.set_box_aspect(tuple(high - low), zoom=1.08)  # type: ignore[arg-type, call-arg]
         for side in (ax.xaxis, ax.yaxis, ax.zaxis):  # type: ignore[attr-defined]
             side.set_tick_params(pad=-1)
             side.labelpad = -3

@@ -27,7 +27,7 @@ COLUMN = 3.5
 PAGE = 7.16
 """Width in inches of two journal columns."""
 
-_DEFENDER_COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+_DEFENDER_COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#3D97CE", "#B87E00")  # the last two darker, to be read in grey
 _DEFENDER_MARKERS = ("o", "s", "^", "D", "v", "P", "h")
 _DEFENDER_DASHES: tuple[Any, ...] = (
     "-",
