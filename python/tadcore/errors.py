@@ -139,14 +139,14 @@ class NoEquilibriumError(TadcoreError, ArithmeticError):
 
     def __str__(self) -> str:
         advice = (
-            f"the longest horizon on the grid of step {self.step:g} is {self.longest_horizon!r}"
+            f"the longest on the grid of step {self.step:g} is {self.longest_horizon!r}"
             if self.longest_horizon > 0.0
             else f"not even one step of {self.step:g} is short enough"
         )
         return (
-            f"the game has no feedback Nash equilibrium on [0, {self.horizon:g}]: followed back from the horizon, "
-            f"the Riccati solution escapes to infinity after {self.escape_time!r}, at t = {self.escape_instant:.6g}. "
-            f"An equilibrium exists only for horizons shorter than {self.escape_time!r}; {advice}"
+            f"the game has no feedback Nash equilibrium on [0, {self.horizon:g}]: the Riccati solution is finite only "
+            f"from t = {self.escape_instant:.6g} on, {self.escape_time:.6g} before the horizon. "
+            f"An equilibrium exists for horizons shorter than that; {advice}"
         )
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -17,13 +17,15 @@ import typer
 from tadcore.errors import ScenarioError, StoreError, TadcoreError
 
 from .explore import explore
+from .many import curve, sweep
 from .maps import draw_map, write_report
 from .options import FAILED, set_backend_aside
 from .paper import reproduce
+from .pictures import animate, compare
 from .runs import scenarios, simulate, validate
 from .store import store
 from .study import study
-from .terminal import complain, say
+from .terminal import complain, hush, say
 from .verify import verify
 
 _BAD_INPUT = 2
@@ -75,6 +77,10 @@ for name, command, summary in (
     ("study", study, "Play many games from a study file."),
     ("map", draw_map, "Draw the outcome over one player's start."),
     ("report", write_report, "Write a finished study as an HTML page."),
+    ("curve", curve, "Play a study at many radii of a player."),
+    ("sweep", sweep, "Run a study at every point of a grid."),
+    ("compare", compare, "Lay two runs over one another."),
+    ("animate", animate, "Write a run as moving pictures."),
     ("explore", explore, "Drag players and radii on a page in the browser."),
     ("verify", verify, "Check the paper's theorems on a scenario."),
 ):
@@ -87,6 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without Greek letters still gets its answer
+    hush(False)
     if arguments is None:
         set_backend_aside()
     try:

@@ -12,8 +12,8 @@ import typer
 from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 
-from .options import Changes, Source, read, writable
-from .terminal import say
+from .options import Changes, Json, Quiet, Source, read, writable
+from .terminal import emit, hush, hushed, say
 
 MOST_PLACES = 100_000
 """Places along one axis of a map."""
@@ -35,6 +35,8 @@ def draw_map(
     time: Annotated[bool, typer.Option("--time", help="Draw when the game ends, not how.")] = False,
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw how the game ends for every place where one player could have started.
 
@@ -47,17 +49,20 @@ def draw_map(
     """
     from tadcore.analysis.maps import check_destination, outcome_map
 
+    hush(quiet or as_json)
     check_destination("--out", out)
     writable("--out", out)
     sc = read(scenario, changes)
     grid = {"x": (*x, size), "y": (*y, _rows(x, y, size))}
-    found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress)
+    found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress and not hushed())
     found.save(out, **({"quantity": "time"} if time else {}))
     total = found.dataset["kind"].size
     say(f"{total:,} places for the start of {player}")
     for name, count in found.counts().items():
         say(f"{name:<12} {count:>12,}  {share(count / total)}", indent=2)
     say(f"written to {out}")
+    if as_json:
+        emit({"player": found.player, "places": total, "counts": found.counts(), "file": str(out)})
 
 
 def _rows(x: tuple[float, float], y: tuple[float, float], size: int) -> int:

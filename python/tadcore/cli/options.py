@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,7 @@ import typer
 
 from tadcore import scenarios as bundled
 from tadcore._shared.files import destination
+from tadcore._shared.text import similar
 from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
@@ -31,6 +33,9 @@ Changes = Annotated[
     typer.Option("--set", metavar="PATH=VALUE", help="Change a field, such as d1.visibility_radius=2; repeatable."),
 ]
 
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else on standard output.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+
 
 def read(source: str, changes: list[str] | None) -> Scenario:
     """The scenario with the changes made; a value is written as in TOML."""
@@ -40,8 +45,24 @@ def read(source: str, changes: list[str] | None) -> Scenario:
         if not equals:
             raise ScenarioError("--set", change, "PATH=VALUE, such as d1.visibility_radius=2")
         found[path.strip()] = parse_toml(f"value = {value}", f"--set {path}")["value"]
-    sc = Scenario.from_toml_string(read_stdin(), name="standard input") if source == STDIN else bundled.find(source)
+    if source == STDIN:
+        sc = Scenario.from_toml_string(read_stdin(), name="standard input")
+    else:
+        _refuse_what_is_not_there(source)
+        sc = bundled.find(source)
     return sc.replace(found) if found else sc
+
+
+def _refuse_what_is_not_there(source: str) -> None:
+    """Say in plain words that there is no such file; what else may be wrong with it, its reader says."""
+    try:
+        there = "\0" in source or Path(source).exists() or source in bundled.names()
+    except OSError:
+        return
+    if not there:
+        hint = similar(source, bundled.names(), cutoff=0.5)
+        words = f"there is no such file, and no bundled scenario of that name{hint and f'; {hint}'}"
+        raise FileNotFoundError(errno.ENOENT, words, source)
 
 
 def usable(out: Path | None) -> None:

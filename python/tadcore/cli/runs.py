@@ -13,8 +13,8 @@ from tadcore import scenarios as bundled
 from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
 
-from .options import FAILED, Changes, Source, has_windows, read, usable
-from .terminal import complain, say, spill
+from .options import FAILED, Changes, Json, Quiet, Source, has_windows, read, usable
+from .terminal import complain, emit, hush, say, sign_of_life, spill
 
 
 def simulate(
@@ -29,6 +29,8 @@ def simulate(
         str,
         typer.Option(metavar="WHEN", help="sampled: at an instant of the grid; continuous: at the crossing itself."),
     ] = "sampled",
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Play a scenario: print how it ends and when the network changes.
 
@@ -41,6 +43,7 @@ def simulate(
     With --out, DIR receives the whole record: run.nc (netCDF, for xarray), scenario.toml and summary.json; with
     --plot also the figures, as PNG and PDF. A name that ends in .nc is that file alone.
     """
+    hush(quiet or as_json)
     sc = read(scenario, changes)
     if out is not None and out.suffix.lower() == ".nc":
         if plot:
@@ -50,6 +53,7 @@ def simulate(
         usable(out)
     if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
+    from tadcore.simulation.files import summary_of
     from tadcore.simulation.run import simulate as play
     from tadcore.simulation.termination import as_termination
 
@@ -60,9 +64,12 @@ def simulate(
     if out is not None:
         run.save(out)
     if plot:
+        sign_of_life("drawing")
         _draw(run, out)
     if out is not None:
         say(f"written to {out}")
+    if as_json:
+        emit(summary_of(run))
     if run.diverged is not None:
         complain(f"the game {run.diverged}; how it ends says nothing of a pursuit")
         raise typer.Exit(FAILED)
@@ -91,15 +98,34 @@ def scenarios(
 def validate(
     scenario: Source,
     changes: Changes = None,
+    equilibrium: Annotated[
+        bool, typer.Option("--equilibrium", help="Leave with 1 where the game has no equilibrium on [0, T].")
+    ] = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Check a scenario file without playing it.
+    """Check a scenario file without playing it, and say whether its game has an equilibrium.
 
     Every field that breaks a rule is named, with what was found and what it must be.
     """
+    from tadcore.errors import NoEquilibriumError, OutOfMemoryError
+    from tadcore.game.equilibrium import solve_equilibrium
+
+    hush(quiet)
     sc = read(scenario, changes)
-    say(f"{scenario}: valid")
+    try:
+        solve_equilibrium(sc)
+        found = ""
+    except NoEquilibriumError as error:
+        longest = f"longest horizon {error.longest_horizon:g}" if error.longest_horizon else "none for one step either"
+        found = f"; no equilibrium on [0, {sc.horizon:g}]: {longest}"
+    except OutOfMemoryError:
+        found = "; too large to say whether there is an equilibrium"
+    say(f"{scenario}: valid{found}")
     for line in sc.describe().splitlines():
         say(line, indent=2)
+    if equilibrium and found:
+        complain(f"{scenario}{found}".replace("; ", ": ", 1))
+        raise typer.Exit(FAILED)
 
 
 def _lines(run: Any, most: int = 20) -> list[str]:

@@ -13,7 +13,8 @@ from tadcore._shared.shares import percent
 from tadcore._shared.toml import STDIN, read_stdin
 from tadcore.errors import ScenarioError
 
-from .terminal import complain, say
+from .options import Json, Quiet
+from .terminal import complain, emit, hush, hushed, say
 
 _INTERRUPTED = 130
 
@@ -44,6 +45,8 @@ def study(
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Play a study, and keep its outcomes in a folder as Parquet.
 
@@ -72,6 +75,7 @@ def study(
     from tadcore.study.part import as_part, folder_of
     from tadcore.study.study import Study
 
+    hush(quiet or as_json)
     if str(file) == STDIN:
         wanted = Study.from_toml_string(read_stdin(), name="standard input")
     else:
@@ -79,7 +83,12 @@ def study(
     which = None if part is None else as_part(_numbers(part))
     if resume:
         Manifest.read(folder_of(which, store))
-    options: dict[str, Any] = {"progress": progress, "store": store, "threads": threads, "table": table}
+    options: dict[str, Any] = {
+        "progress": progress and not hushed(),
+        "store": store,
+        "threads": threads,
+        "table": table,
+    }
     options |= {"keep": None if keep is None else keep.value, "part": which}
     try:
         result = wanted.run(**options)
@@ -87,7 +96,10 @@ def study(
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None
     if which is not None:
-        say(f"{result!r}\nwritten to {store}; tadcore store merge {store} makes one store of all parts")
+        say(f"{result!r}")
+        say(f"written to {store}; tadcore store merge {store} makes one store of all parts")
+        if as_json:
+            emit({"trials": result.trials, "part": list(which), "store": str(store)})
         return
     found = result.probabilities()
     say(f"{result.trials:,} trials")
@@ -96,6 +108,12 @@ def study(
         say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
     say(f"intervals: {percent(found.level)} ({found.method})", indent=2)
     say(f"written to {store}")
+    if as_json:
+        rows = zip(found.names, found.count, found.estimate, found.low, found.high, strict=True)
+        names = ("count", "estimate", "low", "high")
+        outcomes = {row[0]: dict(zip(names, (int(row[1]), *map(float, row[2:])), strict=True)) for row in rows}
+        about = {"level": found.level, "method": found.method, "rule": found.rule, "store": str(store)}
+        emit({"trials": result.trials, "seed": wanted.seed, "outcomes": outcomes, **about})
 
 
 def _numbers(text: str) -> tuple[int, int]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tadcore._shared.console import console
 
@@ -11,9 +12,30 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+_hushed = False
+
+
+def hush(wanted: bool) -> bool:
+    """Print nothing more with `say`, or, for the next command, print again; returns what is wanted."""
+    global _hushed
+    _hushed = wanted
+    return wanted
+
+
+def hushed() -> bool:
+    """Whether nothing is to be printed but errors, and what was asked for as JSON."""
+    return _hushed
+
+
 def say(text: str, *, indent: int = 0) -> None:
-    """Print to standard output; folded to the width of a terminal, untouched in a pipe."""
-    _print(console(stderr=False), text, indent)
+    """Print to standard output, unless it is hushed; folded to the width of a terminal, untouched in a pipe."""
+    if not _hushed:
+        _print(console(stderr=False), text, indent)
+
+
+def emit(found: dict[str, Any]) -> None:
+    """Print a result as JSON, and nothing else on standard output."""
+    spill(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def spill(text: str) -> None:
@@ -26,6 +48,12 @@ def spill(text: str) -> None:
     sys.stdout.flush()
     stream.write(text.encode("utf-8"))
     stream.flush()
+
+
+def sign_of_life(what: str) -> None:
+    """Say on standard error, where a terminal watches, what takes a while."""
+    if not _hushed and sys.stderr is not None and sys.stderr.isatty():
+        _print(console(stderr=True), f"{what} …", 0)
 
 
 def complain(text: str) -> None:

@@ -11,8 +11,8 @@ import typer
 
 from tadcore._shared.files import write_whole
 
-from .options import FAILED, UNDECIDED, Changes, Source, read, writable
-from .terminal import complain, say
+from .options import FAILED, UNDECIDED, Changes, Json, Quiet, Source, read, writable
+from .terminal import complain, emit, hush, say
 
 _MOST = 1_000_000
 
@@ -26,25 +26,30 @@ def verify(
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Key of everything random.")] = 0,
     bound: Annotated[bool, typer.Option(help="Bound Θ from below and print the gap; needs Clarabel.")] = False,
-    out: Annotated[Path | None, typer.Option("--json", metavar="PATH", help="Write the report there.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report there, as JSON.")] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Check the paper's theorems on a scenario: equilibrium, indices, consistency, gains, geometry.
 
     \b
       tadcore verify paper-i1
-      tadcore verify my.toml --starts 5 --json report.json
+      tadcore verify my.toml --starts 5 --out report.json
 
     Every check is printed with its measured value, its bound and where in the paper it comes from. Exit codes: 0 all
     pass; 1 a check failed; 3 none failed, but some are not converged, so that nothing is decided.
     """
     from tadcore.verification import verify as check
 
-    writable("--json", out)
+    hush(quiet or as_json)
+    writable("--out", out)
     report = check(read(scenario, changes), deviations=deviations, starts=starts, seed=seed, bound=bound)
     if out is not None:
         write_whole(out, json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n")
     for line in report.lines():
         say(line)
+    if as_json:
+        emit(report.to_dict())
     if report.failures:
         complain(f"{len(report.failures)} of {len(report)} checks do not pass")
         raise typer.Exit(FAILED)

@@ -71,7 +71,7 @@ def test_bad_input_leaves_with_2_and_one_sentence(tadcore, tmp_path):
     assert (code, out) == (2, "")
     assert f"{place}, line 1: " in err
     for source, words in [
-        ("gone.toml", "must be a file, or the name of a bundled scenario"),
+        ("gone.toml", "there is no such file, and no bundled scenario of that name"),
         ("paper-l1", "did you mean paper-i1?"),
         (tmp_path, "must be a file"),
         ("a\0b", "must be a path"),
@@ -194,7 +194,7 @@ def test_a_terminal_of_any_width_gets_its_answer(columns):
     assert words.endswith(b"captures within 0.1")
     done = subprocess_run("validate", "nothing-like-it", COLUMNS=columns, FORCE_COLOR="1")
     assert done.returncode == 2
-    assert b"must be a file, or the name of a bundled scenario" in b" ".join(done.stderr.split())
+    assert b"there is no such file, and no bundled scenario of that name" in b" ".join(done.stderr.split())
 
 
 @pytest.mark.parametrize("term", ["dumb", "", "unknown"])
@@ -271,7 +271,7 @@ def test_a_name_that_no_file_can_have_is_refused_before_anything_is_computed(tad
     study.write_bytes(STUDY.replace(b"20", b"2_000_000_000"))
     for command in (
         ("map", "paper-i1", "--size", "100000", "--out", f"{long}.png"),
-        ("verify", "paper-i1", "--starts", "1000", "--json", long),
+        ("verify", "paper-i1", "--starts", "1000", "--out", long),
         ("simulate", "paper-i1", "--out", long),
         ("study", study, "--store", long),
         ("study", study, "--store", tmp_path / "store", "--table", long),

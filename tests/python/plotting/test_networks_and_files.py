@@ -140,7 +140,7 @@ def test_runs_that_see_alike_are_named_by_their_ends(runs):
 
 
 def test_what_cannot_be_compared_is_refused(runs, wide):
-    with pytest.raises(ValueError, match="different players: d1, d2, d3, target, attacker and d1"):
+    with pytest.raises(ValueError, match="one of the same players: d1, d2, d3, target, attacker"):
         plotting.compare(runs["paper-i1"], wide)
     with pytest.raises(ValueError, match="what: got 'paths', must be"):
         plotting.compare(runs["paper-i1"], runs["paper-i1-full"], what="paths")

@@ -292,7 +292,7 @@ def test_a_game_that_is_over_at_once(run):
 
 def test_the_command(tmp_path, capsys, monkeypatch):
     out = tmp_path / "report.json"
-    cli.app(["verify", "paper-i1", "--deviations", "1", "--json", str(out)], standalone_mode=False)
+    cli.app(["verify", "paper-i1", "--deviations", "1", "--out", str(out)], standalone_mode=False)
     assert "accepted" in capsys.readouterr().out
     assert json.loads(out.read_text())["ok"]
     failed = v.VerificationReport("t", (v.Check("a.b", 2.0, 1.0, True, "do this", "eq:x"),))

@@ -98,7 +98,7 @@ def test_exit_codes(tmp_path, capsys):
     out = tmp_path / "report.json"
     stiff = ["--set", "attacker.control_weight=1e-12", "--set", "horizon=1e-6", "--set", "step=1e-6"]
     with pytest.raises(SystemExit) as left:
-        cli.main(["verify", "paper-i1", *stiff, "--json", str(out)])
+        cli.main(["verify", "paper-i1", *stiff, "--out", str(out)])
     assert left.value.code == 3
     said = capsys.readouterr()
     assert "could not be decided" in said.err

@@ -1,0 +1,133 @@
+# ruff: noqa: D301 (the help texts mark blocks that keep their lines with a backspace character)
+"""The commands ``curve`` and ``sweep``: a study at many radii, and at every point of a grid of games."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from tadcore._shared.files import write_whole
+from tadcore._shared.shares import estimate, percent
+from tadcore._shared.toml import STDIN, parse_toml, read_stdin
+from tadcore.errors import ScenarioError
+
+from .options import Quiet, writable
+from .terminal import hush, hushed, say, sign_of_life
+
+if TYPE_CHECKING:
+    from tadcore.study.study import Study
+
+_DATA = ".nc"
+File = Annotated[str, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")]
+Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")]
+
+
+def curve(
+    file: File,
+    radii: Annotated[tuple[float, float, int], typer.Option(metavar="LOW HIGH N", help="N radii from LOW to HIGH.")],
+    player: Annotated[str, typer.Option(metavar="NAME", help="Whose: d1, d2, …; target or attacker.")] = "d1",
+    kind: Annotated[str, typer.Option(metavar="KIND", help="visibility or capture.")] = "visibility",
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Figure (.png, .pdf, .svg) or data (.nc).")] = None,
+    progress: Progress = True,
+    quiet: Quiet = False,
+) -> None:
+    """Play the trials of a study at many radii of one player, and print the outcome probabilities.
+
+    \b
+      tadcore curve my-study.toml --player d1 --radii 0.5 6 12
+      tadcore curve my-study.toml --radii 0.5 6 40 --out curve.pdf
+
+    Intervals hold at all radii at once.
+    """
+    hush(quiet)
+    _check(out, (".png", ".pdf", ".svg", _DATA))
+    from tadcore.analysis.radius import radius_curve
+    from tadcore.statistics.outcomes import excluding
+
+    grid = np.linspace(*radii)
+    options: dict[str, Any] = {"player": player, "radii": grid, "kind": kind, "progress": progress and not hushed()}
+    found = radius_curve(_read(file), **options)
+    say(f"{kind} radius of {player}, {found.trials:,} trials at each; {percent(found.level)} intervals, all at once")
+    for r, radius in enumerate(found.radii):
+        cells = []
+        for i in excluding(found.names):
+            ends = (float(part[i, r]) for part in (found.estimate, found.band_low, found.band_high))
+            cells.append(f"{found.names[i]} {' '.join(estimate(*ends, least=3))}")
+        say(f"{radius:<10g} {'  '.join(cells)}", indent=2)
+    if out is None:
+        return
+    if out.suffix == _DATA:
+        write_whole(out, bytes(found.to_xarray().to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+    else:
+        from tadcore import plotting
+        from tadcore.plotting.tools.axes import for_files, root_figure
+
+        sign_of_life("drawing")
+        with for_files(), plotting.style():
+            plotting.save(root_figure(plotting.radius_curve(found)), out.with_suffix(""), formats=[out.suffix[1:]])
+    say(f"written to {out}")
+
+
+def sweep(
+    file: File,
+    over: Annotated[
+        list[str], typer.Option(metavar="PATH=VALUES", help="A field and its values, as an array of TOML; repeatable.")
+    ],
+    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Write outcomes over the grid there.")] = None,
+    store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep every cell there, and resume.")] = None,
+    progress: Progress = True,
+    quiet: Quiet = False,
+) -> None:
+    """Run a study at every point of a grid of games, and print the outcome probabilities of every cell.
+
+    \b
+      tadcore sweep my-study.toml --over 'attacker.control_weight=[0.4, 0.8, 1.6]'
+      tadcore sweep my-study.toml --over 'horizon=[2, 4, 6]' --out swept.nc
+
+    The draws are the same in every cell. A cell without an equilibrium says so.
+    """
+    hush(quiet)
+    _check(out, (_DATA,))
+    from tadcore.analysis.sweeps import sweep as run
+    from tadcore.statistics.outcomes import excluding
+
+    grid: dict[str, Any] = {}
+    for one in over:
+        path, equals, values = one.partition("=")
+        if not equals:
+            raise ScenarioError("--over", one, "PATH=VALUES, such as horizon=[2, 4, 6]")
+        grid[path.strip()] = parse_toml(f"value = {values}", f"--over {path}")["value"]
+    found = run(_read(file), grid, progress=progress and not hushed(), store=store)
+    for cell in found.cells:
+        say(", ".join(f"{path} = {value}" for path, value in cell.values.items()))
+        if cell.result is None:
+            say(f"no equilibrium: it escapes {cell.escape_time:.6g} before T", indent=2)
+            continue
+        shares = cell.result.probabilities()
+        for i in excluding(shares.names):
+            name, count, share, interval = shares.rows()[i]
+            say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
+    if out is not None:
+        write_whole(out, bytes(_plain(found.to_xarray()).to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+        say(f"written to {out}")
+
+
+def _plain(made: Any) -> Any:
+    """The dataset with one coordinate for each dimension, which files can have."""
+    return made.drop_vars([name for name in made.coords if name not in made.dims and name != "status"])
+
+
+def _read(file: str) -> Study:
+    from tadcore.study.study import Study
+
+    return Study.from_toml_string(read_stdin(), name="standard input") if file == STDIN else Study.from_toml(file)
+
+
+def _check(out: Path | None, known: tuple[str, ...]) -> None:
+    """Refuse, before anything is played, a name that tells nothing of what to write, and a place that is none."""
+    if out is not None and out.suffix not in known:
+        raise ScenarioError("--out", str(out), f"a name that ends in {', '.join(known)}")
+    writable("--out", out)
