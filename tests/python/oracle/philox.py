@@ -32,6 +32,6 @@ def uniforms(seed, trial, purpose, entity, index):
     w = philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
 
     def number(low, high):
-        return (((high << HALF | low) >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53
+        return ((high << HALF | low) >> np.uint64(12)).astype(float) * 2.0**-52 + 2.0**-53
 
     return number(w[0], w[1]), number(w[2], w[3])
