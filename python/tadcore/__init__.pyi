@@ -37,10 +37,13 @@ from .game.network import VisibilityNetwork as VisibilityNetwork
 from .game.outcome import Outcome as Outcome, OutcomeKind as OutcomeKind
 from .game.passes import Pass as Pass
 from .game.synthesis import Gains as Gains, synthesize as synthesize
-from .scenario.model import Attacker as Attacker, Defender as Defender, Scenario as Scenario, Target as Target
+from .scenario.model import Scenario as Scenario
+from .scenario.players import Attacker as Attacker, Defender as Defender, Target as Target
+from .scenario.tables import Communication as Communication, Disturbance as Disturbance, Sensing as Sensing
 from .simulation.batch import Batch as Batch, simulate_batch as simulate_batch
 from .simulation.loading import load_run as load_run
-from .simulation.run import Run as Run, simulate as simulate
+from .simulation.play import simulate as simulate
+from .simulation.run import Run as Run
 from .statistics import HalfWidth as HalfWidth
 from .statistics.radius import RadiusCurve as RadiusCurve
 from .study.study import Study as Study, StudyResult as StudyResult, load_study as load_study

@@ -35,6 +35,11 @@ POSITIVE = Rule("a positive finite number", lambda v: (v > 0.0) & (v < math.inf)
 RADIUS = Rule("a positive number, or inf for unlimited sight", lambda v: v > 0.0)
 WEIGHT = Rule("a weight between 1e-30 and 1e30", lambda v: (v >= LIGHTEST) & (v <= HEAVIEST))
 FRACTION = Rule("a number in [0, 1]", lambda v: (v >= 0.0) & (v <= 1.0))
+LINK_RADIUS = Rule("a positive number, or inf for links at any distance", RADIUS.holds)
+MEAN_TIME = Rule(
+    "a mean time between 1e-100 and 1e100, or inf", lambda v: ((v >= 1 / FARTHEST) & (v <= FARTHEST)) | (v == math.inf)
+)
+DISTURBANCE = Rule("a number between 0 and 1e100", lambda v: (v >= 0.0) & (v <= FARTHEST))
 
 OF_FIELD = {
     "position": (FINITE, COORDINATE),

@@ -1,5 +1,18 @@
-"""What is played: the scenario and its players, checked and immutable."""
+"""What is played: the scenario with its players and tables, checked and immutable."""
 
-from .model import Attacker, Defender, Scenario, Target
+from .model import Scenario
+from .players import Attacker, Defender, Target
+from .tables import Communication, Disturbance, Sensing, Transmitter
+from .worlds import World
 
-__all__ = ["Attacker", "Defender", "Scenario", "Target"]
+__all__ = [
+    "Attacker",
+    "Communication",
+    "Defender",
+    "Disturbance",
+    "Scenario",
+    "Sensing",
+    "Target",
+    "Transmitter",
+    "World",
+]

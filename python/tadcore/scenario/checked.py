@@ -6,15 +6,22 @@ once, at the outermost entry: the constructor, ``model_validate`` and its relati
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+)
 
 from tadcore.errors import ScenarioError
 
 from .described import DEPRECATED, described, plain_signature
-from .fields import path_of, scenario_error
+from .fields import owner_of, path_of, scenario_error
 from .paths import AXES, normal
 
 if TYPE_CHECKING:
@@ -76,6 +83,15 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
 
         def __delattr__(self, name: str) -> None:
             raise ScenarioError(path_of((name,), self._root), "del", _IMMUTABLE)
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        """A field that is None is one that is left out."""
+        return ((name, value) for name, value in super().__repr_args__() if value is not None)
+
+    @model_serializer(mode="wrap")
+    def _written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """What is left out is not written."""
+        return {name: value for name, value in handler(self).items() if value is not None}
 
     def __setstate__(self, state: dict[Any, Any]) -> None:
         """Take what a pickle holds, if it is valid: it may have been written by another version, or by hand."""
@@ -143,7 +159,7 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
                     raise ScenarioError(path, value, f'set once only: "{taken[name]}" sets it too')
                 taken[name] = path
                 try:
-                    _assign(data, name, value)
+                    _assign(data, name, value, type(self))
                 except LookupError:
                     raise ScenarioError(path, value, self._rule_of(path)) from None
         return type(self).model_validate(data)
@@ -177,11 +193,15 @@ def _translate(model: type[Any], error: ValidationError) -> ScenarioError:
     return scenario_error(error, model, model._root)
 
 
-def _assign(data: dict[str, Any], name: str, value: Any) -> None:
+def _assign(data: dict[str, Any], name: str, value: Any, model: type[BaseModel]) -> None:
     """Set the entry of a nested table that `name` means, or raise LookupError; tuples and models are opened."""
     node: Any = data
     *way, last = name.split(".")
+    location: tuple[str | int, ...] = ()
     for part in way:
+        location += (int(part) if part.isdecimal() and len(part) < 10 else part,)
+        if isinstance(node, dict) and node.get(part) is None and owner_of(model, (*location, "")) is not None:
+            node[part] = {}  # a table that is left out is begun
         key = _key(node, part)
         node[key] = node = _open(node[key])
     if isinstance(node, dict) and last.isidentifier():

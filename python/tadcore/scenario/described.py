@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from typing import Any
 
 from pydantic import BaseModel
@@ -54,5 +55,5 @@ def _default(field: Any) -> Any:
 
 
 def _words(field: Any) -> str:
-    kind = inspect.formatannotation(field.annotation).replace("tadcore.scenario.model.", "").replace("typing.", "")
+    kind = re.sub(r"\b(tadcore\.scenario\.\w+|typing)\.", "", inspect.formatannotation(field.annotation))
     return kind if field.is_required() else f"{kind}, default {_default(field)!r}"

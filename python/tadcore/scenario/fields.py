@@ -15,10 +15,14 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from tadcore._shared.limits import (
     COORDINATE,
+    DISTURBANCE,
+    FARTHEST,
     FINITE,
     FRACTION,
     HEAVIEST,
     LIGHTEST,
+    LINK_RADIUS,
+    MEAN_TIME,
     MOST_DEFENDERS,
     POSITIVE,
     RADIUS,
@@ -77,6 +81,7 @@ def _kind(rule: Rule) -> Callable[[object], float]:
 
 
 is_positive, is_radius, is_fraction = _kind(POSITIVE), _kind(RADIUS), _kind(FRACTION)
+is_mean_time, is_link_radius, is_disturbance = _kind(MEAN_TIME), _kind(LINK_RADIUS), _kind(DISTURBANCE)
 _is_bounded_weight, _is_near, _is_finite = _kind(WEIGHT), _kind(COORDINATE), _kind(FINITE)
 
 
@@ -133,6 +138,15 @@ def is_gamma(value: object) -> tuple[float, ...]:
     return numbers
 
 
+def is_count(value: object) -> int:
+    """A whole number, 0 or more."""
+    rule = f"a whole number from 0 to {MOST_DEFENDERS}"
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, bool) or not isinstance(plain, int) or not 0 <= plain <= MOST_DEFENDERS:
+        raise refuse(value, rule)
+    return plain
+
+
 def is_team(value: object) -> object:
     """At least one defender, and no more than any game could play."""
     rule = "a list of at least one defender ([[defenders]] tables in TOML)"
@@ -148,6 +162,10 @@ Positive = Annotated[float, Field(gt=0.0), BeforeValidator(is_positive)]
 Weight = Annotated[float, Field(ge=LIGHTEST, le=HEAVIEST), BeforeValidator(is_weight)]
 Radius = Annotated[float, Field(gt=0.0), BeforeValidator(is_radius)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0), BeforeValidator(is_fraction)]
+LinkRadius = Annotated[float, Field(gt=0.0), BeforeValidator(is_link_radius)]
+MeanTime = Annotated[float, Field(gt=0.0), BeforeValidator(is_mean_time)]
+Disturbed = Annotated[float, Field(ge=0.0, le=FARTHEST), BeforeValidator(is_disturbance)]
+Relays = Annotated[int, Field(ge=0, le=MOST_DEFENDERS), BeforeValidator(is_count)]
 Position = Annotated[tuple[float, ...], Field(min_length=2, max_length=3), BeforeValidator(is_position)]
 Gamma = Annotated[tuple[float, ...], Field(min_length=3, max_length=4), BeforeValidator(is_gamma)]
 
@@ -160,19 +178,22 @@ def path_of(location: Location, root: str = "") -> str:
     return path
 
 
-def _owner(model: type[BaseModel], location: Location) -> type[BaseModel] | None:
+def table_of(model: type[BaseModel], name: str) -> type[BaseModel] | None:
+    """The model of a field that is a table, or a list of tables; None for any other field."""
+    field = model.model_fields.get(name)
+    if field is None:
+        return None
+    inner = [field.annotation, *get_args(field.annotation)]
+    return next((c for c in inner if isinstance(c, type) and issubclass(c, BaseModel)), None)
+
+
+def owner_of(model: type[BaseModel], location: Location) -> type[BaseModel] | None:
     """The model whose field the last part of `location` names."""
+    found: type[BaseModel] | None = model
     for part in location[:-1]:
-        if isinstance(part, str):
-            field = model.model_fields.get(part)
-            if field is None:
-                return None
-            inner = [field.annotation, *get_args(field.annotation)]
-            found = next((c for c in inner if isinstance(c, type) and issubclass(c, BaseModel)), None)
-            if found is None:
-                return None
-            model = found
-    return model
+        if isinstance(part, str) and found is not None:
+            found = table_of(found, part)
+    return found
 
 
 def _missing(owner: type[BaseModel] | None, name: str) -> str:
@@ -186,7 +207,9 @@ _HINTS = 100  # unknown fields for which a known one is looked up; a file may ho
 def _unknown(owner: type[BaseModel] | None, name: str, hint: bool) -> str:
     if owner is None or not hint:
         return "left out: there is no such field"
-    known = similar(name, owner.model_fields) or f"the fields are {', '.join(owner.model_fields)}"
+    inner = [t for t in owner.model_fields if (table := table_of(owner, t)) and name in table.model_fields]
+    meant = f"did you mean {inner[0]}.{name}?" if len(inner) == 1 else similar(name, owner.model_fields)
+    known = meant or f"the fields are {', '.join(owner.model_fields)}"
     return f"left out: there is no such field; {known}"
 
 
@@ -201,9 +224,9 @@ def _unfold(detail: ErrorDetails, model: type[BaseModel], root: str, hint: bool)
         return []
     field = path_of(location, root) or "scenario"
     if kind == "missing":
-        return [ScenarioError(field, MISSING, _missing(_owner(model, location), name))]
+        return [ScenarioError(field, MISSING, _missing(owner_of(model, location), name))]
     if kind == "extra_forbidden":
-        return [ScenarioError(field, detail["input"], _unknown(_owner(model, location), name, hint))]
+        return [ScenarioError(field, detail["input"], _unknown(owner_of(model, location), name, hint))]
     if kind == "literal_error":
         return [ScenarioError(field, detail["input"], str(detail["ctx"]["expected"]).replace("'", '"'))]
     if kind in ("model_type", "model_attributes_type", "dict_type"):

@@ -34,7 +34,7 @@ def hint(path: str, names: Iterable[str]) -> str:
         return f"did you mean {owner}.{field}?" if fields else ""
     stem, dot, axis = field.rpartition(".")
     axes = [name.rpartition(".")[2] for name in fields if dot and name.startswith(f"{stem}.")]
-    if axes and len(axis) <= 1:
+    if axes and len(axis) <= 1 and len(axes[0]) == 1:
         return f"the coordinates of {owner}.{stem} are {', '.join(axes)}"
     close = difflib.get_close_matches(field, fields, n=1, cutoff=0.7)
     return (
@@ -47,7 +47,7 @@ def hint(path: str, names: Iterable[str]) -> str:
 def _split(path: str, known: list[str]) -> tuple[str | None, str]:
     """The player that a path names, however it is written, and the rest; no player where it names none."""
     owners = list(dict.fromkeys(name.partition(".")[0] for name in known if "." in name))
-    team = [owner for owner in owners if owner[0] == "d" and owner != "d*"]
+    team = [owner for owner in owners if owner[0] == "d" and owner[1:].isdecimal()]
     found = _DEFENDER.fullmatch(path)
     if found:
         one, zero, field = found[1], found[2], found[3] or ""
@@ -58,7 +58,8 @@ def _split(path: str, known: list[str]) -> tuple[str | None, str]:
     first, dot, field = path.partition(".")
     if first in owners or first == "*":
         return first, field
-    close = difflib.get_close_matches(first.lower(), ["attacker", "target"], n=1, cutoff=0.75)
+    tables = [owner for owner in owners if owner not in team and owner != "d*"]
+    close = difflib.get_close_matches(first.lower(), tables, n=1, cutoff=0.75)
     return (close[0], field) if close and dot else (None, path)
 
 
@@ -67,7 +68,7 @@ def _without_owner(field: str, known: list[str]) -> str:
     last = field.rpartition(".")[2]
     holders = [name.partition(".")[0] for name in known if name.partition(".")[2] == last]
     if holders:
-        team = all(holder[0] == "d" for holder in holders)
+        team = all(re.fullmatch(r"d(\d+|\*)", holder) for holder in holders)
         return f"did you mean {'d*' if team else holders[0] if len(holders) == 1 else '*'}.{last}?"
     close = difflib.get_close_matches(field, [name for name in known if "." not in name], n=1, cutoff=0.6)
     return f"did you mean {close[0]}?" if close else ""
