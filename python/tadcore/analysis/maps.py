@@ -27,6 +27,7 @@ from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 
 from .grids import BLOCK, Grid
+from .replays import refuse_random
 
 if TYPE_CHECKING:
     import xarray
@@ -135,7 +136,7 @@ def outcome_map(
     Raises
     ------
     ScenarioError
-        No such player, or no such grid.
+        No such player, or no such grid; or the game is one of chance, with failures or disturbances.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
 
@@ -151,6 +152,7 @@ def outcome_map(
     from tadcore.scenario.provenance import provenance
 
     sc = as_scenario(sc)
+    refuse_random(sc, "an outcome map", "tadcore.probability_map plays many trials from every start")
     player = one_of("player", label(player), sc.players)
     grid, who = Grid.of(sc, player, x, y, z), sc.players.index(player)
     kind, defender = np.empty(grid.shape, dtype=np.int8), np.empty(grid.shape, dtype=np.int32)

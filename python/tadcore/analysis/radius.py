@@ -37,7 +37,7 @@ from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_difference
 from tadcore.study.study import Study
 
 from .breakpoints import breakpoints
-from .replays import Replays, starts_of
+from .replays import Replays, refuse_random, seed_of, starts_of
 
 
 @public
@@ -52,6 +52,7 @@ def radius_curve(
     level: float | None = None,
     refine: bool = False,
     tolerance: float = 1e-9,
+    seed: int = 0,
     threads: int | None = None,
     progress: bool = False,
 ) -> RadiusCurve:
@@ -79,6 +80,8 @@ def radius_curve(
         Whether to find, for each trial, the radii at which its outcome changes.
     tolerance : float
         How closely.
+    seed : int
+        Of failures and disturbances, where a Scenario has any; start r is trial r. A study has its own.
     threads : int, optional
         Worker threads; all cores by default.
     progress : bool
@@ -98,7 +101,9 @@ def radius_curve(
     """
     sure = Confidence.of(source, level)
     sc, rows = starts_of(source, positions)
-    games = Replays(sc, rows, player, kind, threads)
+    if refine:
+        refuse_random(sc, "refine", "leave it out; the curve itself shares failures and disturbances between radii")
+    games = Replays(sc, rows, player, kind, threads, seed_of(source, seed))
     grid = games.checked("radii", radii)
     if grid.ndim != 1 or grid.size == 0 or np.any(grid[1:] <= grid[:-1]):
         raise ScenarioError("radii", radii, "a list of increasing radii")

@@ -15,11 +15,19 @@ from tadcore.scenario.paths import label
 from tadcore.scenario.quantities import component
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import Batch, simulate_batch
+from tadcore.simulation.hooks import as_seed
 from tadcore.simulation.starts import Rows, rows_of
 from tadcore.statistics import TrialOutcomes
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusKind
 from tadcore.study.study import Study
+
+
+def refuse_random(sc: Scenario, function: str, instead: str) -> None:
+    """Refuse a game whose outcome from one start is a matter of chance."""
+    if sc.is_random:
+        rule = f"one without failures and disturbances for {function}, since a start has many outcomes here: {instead}"
+        raise ScenarioError("scenario", "a random game", rule)
 
 
 def starts_of(source: ScenarioLike | Study | TrialOutcomes, positions: ArrayLike | None) -> tuple[Scenario, Rows]:
@@ -38,10 +46,21 @@ def starts_of(source: ScenarioLike | Study | TrialOutcomes, positions: ArrayLike
     return source, Rows(starts, source.visibility_radii, source.capture_radii)
 
 
-class Replays:
-    """The same starts at any radius of one player."""
+def seed_of(source: ScenarioLike | Study | TrialOutcomes, seed: int) -> int:
+    """The seed of failures and disturbances: the one given with a scenario, or that of a study."""
+    if isinstance(source, Scenario | str | os.PathLike):
+        return as_seed(seed)
+    if seed != 0:
+        raise ScenarioError("seed", seed, "left out: a study brings its own")
+    return source.seed
 
-    def __init__(self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None) -> None:
+
+class Replays:
+    """The same starts, with the same failures and disturbances, at any radius of one player."""
+
+    def __init__(
+        self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None, seed: int = 0
+    ) -> None:
         player = label(player)
         if not isinstance(kind, str) or kind not in ("visibility", "capture"):
             raise ScenarioError("kind", kind, 'one of "visibility" and "capture"')
@@ -49,7 +68,7 @@ class Replays:
         if not isinstance(player, str) or player not in labels:
             raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
         self.column = component(sc, f"{player}.{kind}_radius").row
-        self.sc, self.rows, self.player, self.kind, self.threads = sc, rows, player, kind, threads
+        self.sc, self.rows, self.player, self.kind, self.threads, self.seed = sc, rows, player, kind, threads, seed
         self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
 
     def checked(self, field: str, radii: ArrayLike) -> Floats:
@@ -78,9 +97,8 @@ class Replays:
         if np.ndim(radius) and varied.ndim == 1:
             varied = np.repeat(varied[np.newaxis], len(positions), axis=0)
         varied[..., self.column] = radius
-        if self.kind == "visibility":
-            return simulate_batch(self.sc, positions, varied, capture, threads=self.threads)
-        return simulate_batch(self.sc, positions, visibility, varied, threads=self.threads)
+        sight, reach = (varied, capture) if self.kind == "visibility" else (visibility, varied)
+        return simulate_batch(self.sc, positions, sight, reach, threads=self.threads, seed=self.seed)
 
 
 class Placed:
@@ -88,7 +106,7 @@ class Placed:
 
     def __init__(self, source: Study | TrialOutcomes, player: str, threads: int | None) -> None:
         self.sc, self.rows = starts_of(source, None)
-        self.player, self.threads = label(player), threads
+        self.player, self.threads, self.seed = label(player), threads, source.seed
         if self.player not in self.sc.players:
             raise ScenarioError("player", player, f"one of {', '.join(self.sc.players)}")
         self.row = self.sc.players.index(self.player)
@@ -101,12 +119,17 @@ class Placed:
 
     def events(self, places: Floats) -> NDArray[np.bool_]:
         """Which trials ended in each outcome from each place (L, dim), last those that diverged: (4 + n, L, M)."""
+        together = 1 if self.sc.is_random else len(places)  # a batch numbers its rows, and with them its draws
+        blocks = [self._played(places[first : first + together]) for first in range(0, len(places), together)]
+        return np.concatenate(blocks, axis=1)
+
+    def _played(self, places: Floats) -> NDArray[np.bool_]:
         positions = np.tile(self.rows.positions, (len(places), 1, 1))
         positions[:, self.row] = np.repeat(places, self.trials, axis=0)
         sight, capture = (
             radii if radii.ndim == 1 else np.tile(radii, (len(places), 1))
             for radii in (self.rows.visibility_radii, self.rows.capture_radii)
         )
-        batch = simulate_batch(self.sc, positions, sight, capture, threads=self.threads)
+        batch = simulate_batch(self.sc, positions, sight, capture, threads=self.threads, seed=self.seed)
         events = indicators(batch.kind, batch.defender, self.sc.n, batch.diverged)
         return events.reshape(len(events), len(places), self.trials)

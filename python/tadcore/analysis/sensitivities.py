@@ -27,6 +27,8 @@ from tadcore.study.vary import quantities
 
 _LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open unit cube
 
+from .replays import refuse_random
+
 
 @public
 def sensitivity(
@@ -77,11 +79,13 @@ def sensitivity(
     Raises
     ------
     ScenarioError
-        A name is not one of a number of the game, a drawn value breaks a rule, or an option does.
+        A name is not one of a number of the game, a drawn value breaks a rule, or an option does; or the game is one of
+        chance, with failures or disturbances.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
     sc = as_scenario(sc)
+    refuse_random(sc, "sensitivity", "Sobol' indices are of a function of the inputs alone")
     if not isinstance(inputs, Mapping):
         raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
     known = (*outcome_names(sc.n, diverged=True), NO_EQUILIBRIUM, "time")

@@ -12,6 +12,7 @@ import typer
 from tadcore import scenarios as bundled
 from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
+from tadcore.scenario import worlds
 
 from .options import FAILED, Changes, Json, Quiet, Source, has_windows, read, usable
 from .terminal import complain, emit, hush, say, sign_of_life, spill
@@ -29,6 +30,8 @@ def simulate(
         str,
         typer.Option(metavar="WHEN", help="sampled: at an instant of the grid; continuous: at the crossing itself."),
     ] = "sampled",
+    seed: Annotated[int, typer.Option(help="What failures and disturbances are drawn from, with --trial.")] = 0,
+    trial: Annotated[int, typer.Option(help="The trial of a study with that seed.")] = 0,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -54,11 +57,11 @@ def simulate(
     if plot and out is None and not has_windows():
         raise ScenarioError("--plot", "no display to draw on", "given together with --out DIR here")
     from tadcore.simulation.files import summary_of
-    from tadcore.simulation.run import simulate as play
+    from tadcore.simulation.play import simulate as play
     from tadcore.simulation.termination import as_termination
 
     when = as_termination(termination)
-    run = play(sc) if when == "sampled" else play(sc, termination=when)
+    run = play(sc, termination=when, seed=seed, trial=trial)
     for line in _lines(run):
         say(line)
     if out is not None:
@@ -134,7 +137,9 @@ def _lines(run: Any, most: int = 20) -> list[str]:
     passes = [f"between instants: {each}" for each in run.passes[:most]]
     passes += [f"  … and {len(run.passes) - most} more passes"] if len(run.passes) > most else []
     lost = [] if run.diverged is None else [f"the game {run.diverged}"]
-    lines = [str(run.outcome), *lost, *passes, "network:"]
+    drawn = [f"seed {run.seed}, trial {run.trial}"] if run.scenario.is_random else []
+    around = [*worlds.describe(run.scenario)[: -1 if drawn else None], *drawn]
+    lines = [str(run.outcome), *lost, *passes, *around, "network:"]
     for change in changes[:most]:
         edges = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
         lines.append(f"  t = {change.time:<8.10g} {'  '.join(edges) or 'no edges'}")

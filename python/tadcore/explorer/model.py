@@ -14,7 +14,7 @@ from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.scenario.model import Scenario
-from tadcore.simulation.run import simulate
+from tadcore.simulation.play import simulate
 
 MOST_POINTS = 400
 """No curve goes to the browser with more points than about this."""

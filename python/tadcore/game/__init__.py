@@ -2,6 +2,7 @@
 
 from .changes import Interval, NetworkChange
 from .chattering import Chatter
+from .course import Contact, Course, EdgeOutage, Outage
 from .divergence import Divergence
 from .equilibrium import Equilibrium, solve_equilibrium
 from .network import VisibilityNetwork
@@ -12,11 +13,15 @@ from .synthesis import Gains, synthesize
 
 __all__ = [
     "Chatter",
+    "Contact",
+    "Course",
     "Divergence",
+    "EdgeOutage",
     "Equilibrium",
     "Gains",
     "Interval",
     "NetworkChange",
+    "Outage",
     "Outcome",
     "OutcomeKind",
     "Pass",

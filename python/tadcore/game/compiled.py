@@ -16,6 +16,7 @@ import numpy as np
 
 from tadcore import _core
 from tadcore.scenario.model import Scenario
+from tadcore.scenario.worlds import DETECTIONS, SENSORS
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 _KEPT = 8
@@ -45,6 +46,19 @@ def game_of(sc: ScenarioLike) -> _core.Game:
                 _games.popitem(last=False)
         _games.move_to_end(key)
         return game
+
+
+def core_world(sc: Scenario) -> _core.World | None:
+    """What surrounds the game of a scenario, as the core takes it; None for the paper's game."""
+    world = sc.world
+    if world is None:
+        return None
+    given = {name: getattr(world, name) for name in ("stationary", "disturbance", *SENSORS, *DETECTIONS)}
+    if world.link_radius is not None:
+        given["link_radius"] = [None if np.isnan(radius) else radius for radius in world.link_radius.tolist()]
+        names = ("link_mean_time_up", "link_mean_time_down", "link_stationary", "relays", "common_frame")
+        given |= {name: getattr(world, name) for name in names}
+    return _core.World(**given)
 
 
 def _arguments(sc: Scenario) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.scenario.model import Scenario
 
 from .changes import Interval, NetworkChange
+from .course import Course
 from .divergence import Divergence
 from .outcome import Outcome
 from .passes import Pass
@@ -66,6 +67,14 @@ class Recorded(Protocol):
     @property
     def passes(self) -> tuple[Pass, ...]:
         """Capture radii entered between two instants."""
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """What each player saw itself, shape (L + 1, m, N): 𝒜 but for what was reported."""
+
+    @property
+    def course(self) -> Course | None:
+        """What failed, who heard whom; None where nothing surrounds the game."""
 
     @property
     def network_changes(self) -> tuple[NetworkChange, ...]:

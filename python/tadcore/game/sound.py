@@ -11,6 +11,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.scenario.model import Scenario
 
 from .changes import Interval, NetworkChange, intervals_of
+from .course import Course
 from .divergence import Divergence
 from .outcome import Outcome
 from .passes import Pass
@@ -32,6 +33,8 @@ class Sound:
     theta: Floats
     theta_terms: Floats
     passes: tuple[Pass, ...]
+    seen: NDArray[np.bool_]
+    course: Course | None
     network_changes: tuple[NetworkChange, ...]
 
     def intervals(self) -> tuple[Interval, ...]:
@@ -57,5 +60,7 @@ def until_divergence(run: Recorded) -> Recorded:
         theta=run.theta[rows],
         theta_terms=run.theta_terms[rows],
         passes=run.passes,
+        seen=run.seen[rows],
+        course=None if run.course is None else run.course.until(rows),
         network_changes=tuple(change for change in run.network_changes if change.time < end or not change.time),
     )

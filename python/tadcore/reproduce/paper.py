@@ -21,7 +21,8 @@ from tadcore import _core, scenarios
 from tadcore._shared.console import console as terminal
 from tadcore._shared.files import as_path, write_whole
 from tadcore._shared.progress import bar
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 
 from .comparison import Report, Row
 from .published import PUBLISHED, Published

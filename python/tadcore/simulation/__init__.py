@@ -3,6 +3,7 @@
 from tadcore.game.passes import Pass
 
 from .batch import Batch, simulate_batch
-from .run import Run, simulate
+from .play import simulate
+from .run import Run
 
 __all__ = ["Batch", "Pass", "Run", "simulate", "simulate_batch"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
 from tadcore._shared.calls import public
 from tadcore._shared.html import as_html
-from tadcore.game.compiled import game_of
+from tadcore.game.compiled import core_world, game_of
 from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .rules import capture_rows, compare, visibility_rows
+from .hooks import as_seed, as_trial
+from .rules import capture_rows, compare, refuse_between, visibility_rows
 from .termination import Termination, as_termination
 
 if TYPE_CHECKING:
@@ -108,6 +109,8 @@ def simulate_batch(
     *,
     termination: Termination = "sampled",
     passes: bool = False,
+    seed: int = 0,
+    first_trial: int = 0,
 ) -> Batch:
     """Play M games that share the scenario's weights, horizon and step.
 
@@ -131,6 +134,9 @@ def simulate_batch(
         `tadcore.simulate`.
     passes : bool
         Whether to look for games that enter a capture radius between two instants: `Batch.passed`.
+    seed, first_trial : int
+        What failures and disturbances are drawn from: row r is trial ``first_trial + r``, and has the course that
+        ``simulate(sc, seed=seed, trial=first_trial + r)`` has. Without any they change nothing.
 
     Returns
     -------
@@ -141,7 +147,7 @@ def simulate_batch(
     ------
     ScenarioError
         A shape or an entry breaks a rule, or ``termination`` is neither of the two; the field is named as in
-        ``positions[17, 2, 0]``.
+        ``positions[17, 2, 0]``. Continuous termination or passes are asked for, and players are disturbed.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
 
@@ -157,12 +163,16 @@ def simulate_batch(
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
     sight = visibility_rows(sc, visibility_radii, len(starts))
     capture = capture_rows(sc, capture_radii, len(starts))
-    compare(starts, capture, sight, sc.n)
+    compare(starts, capture, sight, sc)
+    key = {"seed": as_seed(seed), "first_trial": as_trial("first_trial", first_trial)}
+    as_trial("first_trial", key["first_trial"] + max(len(starts) - 1, 0))
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
-    continuous = as_termination(termination) == "continuous"
-    looking = as_flag("passes", passes)
+    ending, looking = as_termination(termination), as_flag("passes", passes)
     game = game_of(sc)
+    refuse_between(sc, ending, passes=looking)
+    world = core_world(sc)
+    outer: dict[str, Any] = {} if world is None else {"world": world, **key}
     kind, defender, time, diverged, passed = game.simulate_batch(
-        starts, sight, capture, continuous=continuous, passes=looking, threads=workers
+        starts, sight, capture, continuous=ending == "continuous", passes=looking, threads=workers, **outer
     )
     return Batch(kind, defender, time, diverged, passed if looking else None, sc.n)

@@ -17,9 +17,11 @@ from pydantic import TypeAdapter
 
 from tadcore._shared.files import as_path, destination, write_whole
 from tadcore.errors import ScenarioError
+from tadcore.game.course import ARRAYS
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.synthesis import theta_terms
+from tadcore.scenario import worlds
 from tadcore.scenario.provenance import provenance
 
 from .termination import Termination
@@ -29,11 +31,17 @@ SUFFIX = ".nc"
 RECORD = "run"
 """The attribute with all of a run that its dataset does not have."""
 
+COURSE = "course"
+"""Its entry with what is no array of a course."""
+
+OF_COURSE = ("seed", "trial", "from_outside")
+"""What that is."""
+
 SEAL = "sha256"
 """Its entry with the digest of all else."""
 
-VARIABLES = {"times": "time", "gains": "gain"}
-"""Where a variable of the dataset is not called as the field of the run."""
+VARIABLES = {"times": "time", "gains": "gain", "seen": "detected"}
+"""Where a variable of the dataset is not called as the field of the run, or of its course."""
 
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
 
@@ -108,6 +116,7 @@ def dataset_of(run: Written) -> xr.Dataset:
                 _about("whether a player sees another; not itself; who has no radius sees all", "", "eq:limob"),
             ),
             "gain": (team, run.gains, _about("feedback rows, u_i = gain @ z", "K_i I_i", "eq:nwadapt")),
+            **_around(run),
         },
         coords={
             "time": ("time", run.times, _about("time", "t", "")),
@@ -117,12 +126,14 @@ def dataset_of(run: Written) -> xr.Dataset:
             "entry": list(sc.players[:-1]),
             "seen": list(sc.players),
             "term": list(theta_terms(sc.interaction)),
+            **({} if run.course is None else {"speaker": list(sc.constrained)}),
         },
         attrs={
             "title": str(run.outcome),
             "interaction": sc.interaction,
             "references": _PAPER,
             **variant_of(run),
+            **world_of(run),
             **divergence_of(run),
             **provenance(sc),
             **record_of(run),
@@ -131,14 +142,44 @@ def dataset_of(run: Written) -> xr.Dataset:
 
 
 def sees_of(run: Written) -> NDArray[np.bool_]:
-    """Who sees whom of all players, at every instant: 𝒜 without its fold, and rows of ones for unlimited sight."""
-    rows, m, size = run.adjacency.shape
+    """Who sees whom of all players, at every instant: 𝒜 without its fold, and rows of ones for unlimited sight.
+
+    What is told is not among it.
+    """
+    rows, m, size = run.seen.shape
     sees = np.ones((rows, size + 1, size + 1), dtype=np.bool_)
-    sees[:, :m, :size] = run.adjacency
+    sees[:, :m, :size] = run.seen
     own = np.arange(m)
-    sees[:, own, size] = run.adjacency[:, own, own]  # an entry of its own row says whether it sees the attacker
+    sees[:, own, size] = run.seen[:, own, own]  # an entry of its own row says whether it sees the attacker
     sees[:, np.arange(size + 1), np.arange(size + 1)] = False
     return sees
+
+
+def _around(run: Written) -> dict[str, Any]:
+    """What failed, who heard whom and what was displaced; empty for the paper's game."""
+    if run.course is None:
+        return {}
+    dims = {"seen": ("time", "observer", "entry"), "sensor_up": ("time", "observer")}
+    dims |= {"edge_up": dims["seen"], "heard": ("time", "observer", "speaker")}
+    dims |= {"displacement": ("time", "player", "axis")}
+    words = {
+        "seen": "entries as of adjacency: what the player sees itself; adjacency has what is reported to it too",
+        "sensor_up": "whether the player's sensor works",
+        "edge_up": "entries as of adjacency: whether the edge is detected in range, the sensor working",
+        "heard": "whether the observer hears the speaker",
+        "displacement": "what a disturbance adds to the position at the end of the step",
+    }
+    return {
+        VARIABLES.get(name, name): (dims[name], getattr(run.course, name), _about(words[name], "", ""))
+        for name in ARRAYS
+    }
+
+
+def world_of(run: Written) -> dict[str, Any]:
+    """What a reader of a file must know of a run with failures, links or disturbances; empty for the paper's game."""
+    if run.course is None or run.scenario.world is None:
+        return {}
+    return {"world": "; ".join(worlds.describe(run.scenario)), "seed": run.course.seed, "trial": run.course.trial}
 
 
 def variant_of(run: Written) -> dict[str, Any]:
@@ -176,6 +217,7 @@ def summary_of(run: Written) -> dict[str, Any]:
         },
         "diverged": run.diverged and {"time": run.diverged.time, "size": run.diverged.size, "text": str(run.diverged)},
         **variant_of(run),
+        **world_of(run),
         "passes": [dataclasses.asdict(each) for each in run.passes],
         "network_changes": [
             {"time": c.time, "added": _arrows(c.added), "removed": _arrows(c.removed)} for c in run.network_changes
@@ -196,9 +238,12 @@ def _arrows(edges: tuple[Edge, ...]) -> list[str]:
 
 @functools.cache
 def fields_of(kind: type[Any]) -> tuple[list[str], dict[str, TypeAdapter[Any]]]:
-    """The fields of a run that are arrays, and how each other one, the scenario apart, becomes JSON and comes back."""
+    """The fields of a run that are arrays, and how each other one becomes JSON and comes back.
+
+    The scenario and the course are kept apart.
+    """
     hints = get_type_hints(kind)
-    names = [field.name for field in dataclasses.fields(kind) if field.name != "scenario"]
+    names = [field.name for field in dataclasses.fields(kind) if field.name not in ("scenario", COURSE)]
     arrays = [name for name in names if get_origin(hints[name]) is np.ndarray]
     return arrays, {name: TypeAdapter(hints[name]) for name in names if name not in arrays}
 
@@ -215,7 +260,11 @@ def record_of(run: Written) -> dict[str, str]:
     """What the dataset does not say of a run, as an attribute."""
     arrays, others = fields_of(type(run))
     record = {name: adapter.dump_python(getattr(run, name)) for name, adapter in others.items()}
-    sealed = {SEAL: seal(run.scenario.to_toml(), record, (getattr(run, name) for name in arrays))}
+    sealing = [getattr(run, name) for name in arrays]
+    if run.course is not None:
+        record[COURSE] = {name: getattr(run.course, name) for name in OF_COURSE}
+        sealing += [getattr(run.course, name) for name in ARRAYS]
+    sealed = {SEAL: seal(run.scenario.to_toml(), record, sealing)}
     return {RECORD: json.dumps(record | sealed)}
 
 

@@ -12,12 +12,17 @@ from pydantic import ValidationError
 
 from tadcore._shared.files import as_path, strange
 from tadcore.errors import ScenarioError
+from tadcore.game.course import ARRAYS, Course, shapes as course_shapes
 from tadcore.scenario.model import Scenario
 
-from .files import RECORD, SEAL, VARIABLES, fields_of, seal
+from .files import COURSE, OF_COURSE, RECORD, SEAL, VARIABLES, fields_of, seal
+from .hooks import as_seed, as_trial
 from .run import Run
 
 _RULE = "a run that Run.save wrote: a folder, or a file that ends in .nc"
+
+
+_BITS = ("adjacency", "seen", "sensor_up", "edge_up", "heard")
 
 
 def load_run(path: str | os.PathLike[str]) -> Run:
@@ -82,16 +87,29 @@ def _unpacked(data: xr.Dataset, name: str) -> Run:
     if missing:
         raise ValueError(f"it has no variable {missing[0]}")
     values: dict[str, Any] = {field: np.ascontiguousarray(data[VARIABLES.get(field, field)].values) for field in arrays}
-    run = Run(scenario=sc, **values, **rest)
+    course = _course(data, record.get(COURSE))
+    run = Run(scenario=sc, **values, **rest, course=course)
     _check(run, name)
-    if record.pop(SEAL) != seal(str(data.attrs["scenario"]), record, values.values()):
+    arrays_of_course = [] if course is None else [getattr(course, field) for field in ARRAYS]
+    if record.pop(SEAL) != seal(str(data.attrs["scenario"]), record, [*values.values(), *arrays_of_course]):
         raise ValueError("its content is not what was saved")
     return run
+
+
+def _course(data: xr.Dataset, kept: Any) -> Course | None:
+    if kept is None:
+        return None
+    if not isinstance(kept, dict) or set(kept) != set(OF_COURSE) or not all(VARIABLES.get(name, name) in data for name in ARRAYS):
+        raise ValueError("its course is not whole")
+    arrays = {name: np.ascontiguousarray(data[VARIABLES.get(name, name)].values) for name in ARRAYS}
+    return Course(as_seed(kept["seed"]), as_trial("trial", kept["trial"]), **arrays, from_outside=kept["from_outside"])
 
 
 def _check(run: Run, name: str) -> None:
     """Refuse a record that is not one of its scenario: shapes, types, finite numbers, instants, the player named."""
     sc, rows = run.scenario, len(run.times)
+    if run.course is None and sc.world is not None:
+        raise ScenarioError(f"{name}, course", None, "that of the scenario, whose world is not empty")
     team = (rows, len(sc.constrained), sc.n + 1)
     shapes = {
         "times": (rows,),
@@ -102,9 +120,11 @@ def _check(run: Run, name: str) -> None:
         "theta": (rows,),
         "theta_terms": (rows, run.theta_terms.shape[-1]),
     }
-    for field, shape in shapes.items():
-        array = getattr(run, field)
-        kind = np.dtype(bool) if field == "adjacency" else np.dtype(np.float64)
+    entries = [(field, getattr(run, field), shape) for field, shape in shapes.items()]
+    if run.course is not None:
+        entries += [(field, getattr(run.course, field), shape) for field, shape in course_shapes(sc, rows).items()]
+    for field, array, shape in entries:
+        kind = np.dtype(bool if field in _BITS else np.float64)
         if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
             raise ScenarioError(f"{name}, {field}", f"{array.dtype} {array.shape}", f"finite {kind} of shape {shape}")
     if rows == 0 or run.times[0] != 0.0 or (np.diff(run.times) <= 0.0).any():

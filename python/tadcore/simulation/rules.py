@@ -1,4 +1,4 @@
-"""The radii that a batch takes: their shapes, and the rules of `tadcore._shared.limits` on every entry."""
+"""The radii that a batch takes, by the rules of `tadcore._shared.limits`; and which ends a disturbed game can have."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from tadcore._shared.arrays import Floats, as_real, refuse_where
 from tadcore._shared.limits import OF_FIELD, can_be_told, sees_whom_it_intercepts, too_far
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
+
+from .termination import Termination
 
 
 def visibility_rows(sc: Scenario, values: ArrayLike | None, games: int) -> Floats:
@@ -42,8 +44,9 @@ def _rows(name: str, given: Floats, games: int, columns: int, meaning: str, fiel
     return np.ascontiguousarray(np.atleast_2d(given))
 
 
-def compare(starts: Floats, capture: Floats, sight: Floats, n: int) -> None:
-    """Whoever intercepts sees the attacker, σ < ζ; and rounding does not decide who is seen."""
+def compare(starts: Floats, capture: Floats, sight: Floats, sc: Scenario) -> None:
+    """Whoever intercepts sees the attacker, σ < ζ; and rounding does not decide who is seen, nor who is heard."""
+    n = sc.n
     bad = ~sees_whom_it_intercepts(capture[:, :n], sight[:, :n])
     shown = np.broadcast_to(sight[:, :n], bad.shape)
     refuse_where("visibility_radii", shown, bad, "larger than the defender's capture radius")
@@ -52,6 +55,23 @@ def compare(starts: Floats, capture: Floats, sight: Floats, n: int) -> None:
     if bad.any():
         farthest = float(extents[bad.any(axis=1)].max())
         refuse_where("visibility_radii", np.broadcast_to(sight, bad.shape), bad, too_far(farthest))
+    world = sc.world
+    if world is not None and world.link_radius is not None:
+        lost = (~(np.isnan(world.link_radius) | can_be_told(world.link_radius, extents[:, None]))).any(axis=1)
+        rule = f"such that the radius of communication is {too_far(float(extents[lost].max(initial=0.0)))}"
+        refuse_where("positions", extents, lost, rule)
+
+
+def refuse_between(sc: Scenario, termination: Termination, *, passes: bool = False) -> None:
+    """Refuse what needs the path between two instants, where players are disturbed and it is not known."""
+    world = sc.world
+    if world is None or not world.shakes:
+        return
+    why = "players are disturbed, and where they are between two instants is not known"
+    if termination == "continuous":
+        raise ScenarioError("termination", termination, f'"sampled": {why}')
+    if passes:
+        raise ScenarioError("passes", passes, f"left out: {why}")
 
 
 def extents_of(starts: Floats) -> Floats:

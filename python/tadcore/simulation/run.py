@@ -1,9 +1,4 @@
-"""One game, everything recorded.
-
-At every instant t_k of the grid: termination, the network from the distances (eq:limob of Singh and Reddy), the gains
-for that network (eq:optproblem, eq:optproblem2), then one sampled-data step of the closed loop (zero-order hold),
-z(t_{k+1}) = exp(C_k δ) z(t_k). Everything is dimensionless, as in the paper.
-"""
+"""One game, everything recorded: the record, and what can be asked of it."""
 
 from __future__ import annotations
 
@@ -14,19 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats, as_amount
-from tadcore._shared.calls import public
+from tadcore._shared.arrays import Floats
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.chattering import Chatter
-from tadcore.game.compiled import game_of
+from tadcore.game.course import Contact, Course, EdgeOutage, Outage, contacts, edge_outages, sensor_outages
 from tadcore.game.divergence import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.game.passes import Pass
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
-from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .termination import Termination, as_termination
+from .termination import Termination
 from .variants import told
 
 if TYPE_CHECKING:
@@ -40,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
-    """A game from its start to its end; made by `simulate`.
+    """A game from its start to its end; made by `tadcore.simulate`.
 
     The record has L + 1 rows, t_0 … t_L, the last of them the terminal state. m is the number of players with limited
     sight (n in I1, n + 1 in I2) and N = n + 1.
@@ -57,7 +50,8 @@ class Run:
         Positions and controls (velocities) in the order of ``scenario.players``. The last control is the feedback at
         the terminal state under the last network in force.
     adjacency : ndarray of bool, shape (L + 1, m, N)
-        𝒜 at every instant; the last row repeats the last network in force.
+        𝒜 at every instant: what each player used, seen by itself or reported to it; the last row repeats the last
+        network in force.
     gains : ndarray, shape (L + 1, m, N)
         Rows of the feedback of the players with limited sight.
     theta : ndarray, shape (L + 1,)
@@ -73,9 +67,10 @@ class Run:
         Instants at which the synthesis stopped short of its tolerance.
     passes : tuple of Pass
         Capture radii entered between two instants, where termination is not tested, in the order of time, up to a
-        divergence; empty with continuous termination.
+        divergence; empty with continuous termination, and where players are disturbed, whose path between two instants
+        is not known.
     termination : {"sampled", "continuous"}
-        When the game ends, see `simulate`.
+        When the game ends, see `tadcore.simulate`.
     diverged : Divergence or None
         When the game diverged, and how far it went; None where it did not. It is played on, but its end, costs and
         network then say nothing of a pursuit. Where it leaves the range of double precision, the record stops before
@@ -83,7 +78,10 @@ class Run:
     certified : int
         Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
-        The rule by which edges form and break; zero in the paper's game. See `simulate`.
+        The rule by which edges form and break; zero in the paper's game. See `tadcore.simulate`.
+    course : Course or None
+        What failed, who heard whom and what displaced the players; None where the scenario has no such tables and the
+        network is its own.
     """
 
     scenario: Scenario
@@ -104,13 +102,54 @@ class Run:
     passes: tuple[Pass, ...] = ()
     termination: Termination = "sampled"
     diverged: Divergence | None = None
+    course: Course | None = None
+
+    @property
+    def seed(self) -> int:
+        """The seed of failures and disturbances; 0 where there are none."""
+        return 0 if self.course is None else self.course.seed
+
+    @property
+    def trial(self) -> int:
+        """The trial of failures and disturbances; 0 where there are none."""
+        return 0 if self.course is None else self.course.trial
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """What each player saw itself, shape (L + 1, m, N) as ``adjacency``, which it is where nobody reports."""
+        return self.adjacency if self.course is None else self.course.seen
+
+    @property
+    def relayed(self) -> NDArray[np.bool_]:
+        """What players knew by reports alone, shape (L + 1, m, N)."""
+        return self.adjacency & ~self.seen
+
+    @property
+    def sensor_outages(self) -> tuple[Outage, ...]:
+        """(player, start, end) of the stretches over which a sensor did not work, by player."""
+        return () if self.course is None else sensor_outages(self.course, self.times, self.scenario)
+
+    @property
+    def edge_outages(self) -> tuple[EdgeOutage, ...]:
+        """(edge, start, end) of the stretches over which one player would not have detected another, in range or not.
+
+        Those of the player's whole sensor are not among them.
+        """
+        return () if self.course is None else edge_outages(self.course, self.times, self.scenario)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """(listener, speaker, start, end) of the stretches over which one player heard another, by listener."""
+        return () if self.course is None else contacts(self.course, self.times, self.scenario)
 
     @property
     def variant(self) -> str:
         """What sets this run apart from the paper's game, in words; empty where nothing does."""
         named = {"hysteresis": self.hysteresis, "dwell": self.dwell}
         words = [f"{name} {value:g}" for name, value in named.items() if value > 0.0]
-        return " and ".join([*words, *(["continuous termination"] if self.termination == "continuous" else [])])
+        words += ["continuous termination"] if self.termination == "continuous" else []
+        outside = self.course is not None and self.course.from_outside
+        return " and ".join([*words, *(["a network from outside"] if outside else [])])
 
     @property
     def converged(self) -> bool:
@@ -247,86 +286,10 @@ class Run:
             if self.diverged is None
             else f"; DIVERGES at t = {self.diverged.time:.10g}, size {self.diverged.size:.2g}"
         )
-        return f"Run({self.scenario.interaction}: {self.outcome}{lost}; {network}{chattering}{warning}{other})"
+        drawn = f"; seed {self.seed}, trial {self.trial}" if self.scenario.is_random else ""
+        return f"Run({self.scenario.interaction}: {self.outcome}{lost}; {network}{chattering}{warning}{other}{drawn})"
 
 
 def _passed(passes: tuple[Pass, ...]) -> str:
     more = f" and {len(passes) - 1} times more" if len(passes) > 1 else ""
     return f"{passes[0]}{more}"
-
-
-@public
-def simulate(
-    sc: ScenarioLike, *, hysteresis: float = 0.0, dwell: float = 0.0, termination: Termination = "sampled"
-) -> Run:
-    """Play a scenario and record everything.
-
-    Parameters
-    ----------
-    sc : Scenario, path or name
-        The game: a scenario, the path of its TOML file, or the name of a bundled one, as wherever a scenario is
-        taken.
-    hysteresis : float
-        h ≥ 0, a length. With h > 0 an edge forms at a distance of at most ζ and breaks only beyond ζ + h. The first
-        network is the paper's.
-    dwell : float
-        D ≥ 0, a time, rounded up to whole steps. With D > 0 an edge that changed keeps its state for D, wherever the
-        players are; the first network is no change.
-
-        Either makes it *another game than the paper's*, in which an edge must be there exactly when the distance is at
-        most ζ (eq:limob); the run says so. Batches and studies have no such variant.
-
-    termination : {"sampled", "continuous"}
-        When the game ends: at the first instant of the grid at which somebody is within a capture radius, which is the
-        definition; or at the first crossing of a capture radius, at its own time between two instants. The motion
-        within a step is known exactly, so nothing is missed. Feedback and network are those of the grid either way, so
-        the two games are bitwise the same up to the end. The last row of the record is then the state at the crossing.
-
-    Returns
-    -------
-    Run
-        The outcome, the trajectories, the network, Θ and the costs.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The game has no equilibrium on [0, T].
-    ScenarioError
-        `hysteresis` or `dwell` is negative or not finite, or `termination` is neither of the two.
-
-    Examples
-    --------
-    >>> import tadcore
-    >>> run = tadcore.simulate(tadcore.scenarios.load("paper-i1"))
-    >>> print(run.outcome)
-    d1 intercepts the attacker at t = 1.395
-    >>> [change.time for change in run.network_changes]
-    [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
-    """
-    rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
-    ending = as_termination(termination)
-    continuous = ending == "continuous"
-    sc = as_scenario(sc)
-    game, sight, reach = game_of(sc), sc.visibility_radii, sc.capture_radii
-    band, rest = rule["hysteresis"], rule["dwell"]
-    record = game.simulate(sc.positions, sight, reach, hysteresis=band, dwell=rest, continuous=continuous)
-    groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
-    return Run(
-        scenario=sc,
-        outcome=Outcome.of(record.kind, record.defender, record.time, diverged=record.diverged is not None),
-        times=record.times,
-        position=record.position,
-        control=record.control,
-        adjacency=record.adjacency,
-        gains=record.gains,
-        theta=record.theta,
-        theta_terms=record.theta_terms,
-        costs=dict(zip(groups, map(float, record.costs), strict=True)),
-        iterations=record.iterations,
-        unconverged=record.unconverged,
-        certified=record.certified,
-        **rule,
-        passes=tuple(Pass(None if who < 0 else who, *rest) for who, *rest in record.passes),
-        termination=ending,
-        diverged=None if record.diverged is None else Divergence(*record.diverged),
-    )

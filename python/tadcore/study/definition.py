@@ -19,6 +19,7 @@ from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import normal
 from tadcore.scenario.quantities import Quantity
 from tadcore.scenarios.given import ScenarioLike, as_scenario
+from tadcore.simulation.rules import refuse_between
 from tadcore.simulation.termination import Termination, as_termination
 
 from .keeping import Keep, as_keep
@@ -45,9 +46,10 @@ class Definition:
         keep: Keep = "all",
     ) -> None:
         sc = as_scenario(sc)
-        if not isinstance(vary, Mapping) or not vary:
+        if not isinstance(vary, Mapping) or not (vary or sc.is_random):
             example = 'such as {"attacker.position": Box([-3, -3], [3, 3])}'
-            raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}")
+            alone = "; it may be empty where something fails at random or is disturbed"
+            raise ScenarioError("vary", vary, f"a mapping of at least one path to a sampler, {example}{alone}")
         if not isinstance(design, str) or design not in DESIGNS:
             raise ScenarioError("design", design, " or ".join(f'"{name}"' for name in DESIGNS))
         self.trials = as_index("trials", trials, _MOST_TRIALS, least=1)
@@ -59,7 +61,9 @@ class Definition:
             samplers[name] = as_sampler(f'vary["{path}"]', value)
         self._keep = as_keep(keep)
         key = as_index("seed", seed, 2**64 - 1)
-        self.plan = Plan(sc, samplers, key, design, as_termination(termination), as_flag("passes", passes))
+        ending, looking = as_termination(termination), as_flag("passes", passes)
+        refuse_between(sc, ending, passes=looking)
+        self.plan = Plan(sc, samplers, key, design, ending, looking)
         for quantity, sampler in self.plan.varied:
             if design != "random" and not sampler.by_points:
                 rule = f'a sampler with quantiles in the {design} design; this one needs design="random"'
@@ -164,6 +168,7 @@ class Definition:
         )
 
     def __repr__(self) -> str:
-        paths = ", ".join(f"{path} ({type(sampler).__name__})" for path, sampler in self.vary.items())
+        varied = ", ".join(f"{path} ({type(sampler).__name__})" for path, sampler in self.vary.items())
+        paths = f"vary {varied}" if varied else "from one start"
         own = f"; {self.games[0]} varies, so every trial is a game of its own" if self.games else ""
-        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, vary {paths}{own})"
+        return f"Study({self.trials:,} trials of {self.scenario!r}, {self.design}, seed {self.seed}, {paths}{own})"

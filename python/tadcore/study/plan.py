@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._core import Game, Stop, simulate_games
+from tadcore._core import Game, Stop, World, simulate_games
 from tadcore._shared.arrays import Floats
 from tadcore._shared.limits import OF_FIELD, can_be_told, divides, sees_whom_it_intercepts, too_far
 from tadcore._shared.progress import bar
 from tadcore._shared.threads import in_order
 from tadcore.errors import ScenarioError
-from tadcore.game.compiled import game_of
+from tadcore.game.compiled import core_world, game_of
 from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
@@ -127,7 +127,8 @@ class Plan:
                 block = Block(p, generator(self.seed, chunk, q.purpose), chunk * CHUNK)
                 drawn.append(sampler.draw(block, q.components))
         columns = np.empty((len(self.columns), CHUNK))  # each by itself in memory, as everything after this wants it
-        np.concatenate([values.T for values in drawn], out=columns)
+        if drawn:
+            np.concatenate([values.T for values in drawn], out=columns)
         return columns.T[:rows]
 
     def check(self, chunk: int, inputs: Floats) -> None:
@@ -148,6 +149,10 @@ class Plan:
             bad = ~can_be_told(seen, extents)
             path = f"defenders.{i}.visibility_radius" if i < self.scenario.n else f"{where}.visibility_radius"
             self._refuse(chunk, path, np.broadcast_to(seen, bad.shape), bad, too_far(float(extents[int(bad.argmax())])))
+        shortest = self._shortest_link
+        bad = ~can_be_told(np.full(len(inputs), shortest), extents)
+        farthest = too_far(float(extents.max(initial=0.0)))
+        self._refuse(chunk, "communication.radius", np.full(len(inputs), shortest), bad, farthest)
 
     def _check_games(self, chunk: int, inputs: Floats) -> None:
         """The rules that tie the numbers of a game together."""
@@ -193,10 +198,17 @@ class Plan:
             if not all(rule.holds(end) for rule in OF_FIELD[quantity.field] for end in ends):
                 return False
             reach[quantity.field, quantity.row] = ends
-        if not all(can_be_told(reach["visibility_radius", i][0], 2.0 * farthest) for i in range(len(sc.constrained))):
+        shortest = [reach["visibility_radius", i][0] for i in range(len(sc.constrained))]
+        if not all(can_be_told(radius, 2.0 * farthest) for radius in (*shortest, self._shortest_link)):
             return False
         pairs = ((reach["capture_radius", i], reach["visibility_radius", i]) for i in range(sc.n))
         return all(sees_whom_it_intercepts(capture[1], sight[0]) for capture, sight in pairs)
+
+    @cached_property
+    def _shortest_link(self) -> float:
+        """The least radius within which anyone is heard; inf where there are no links."""
+        world = self.scenario.world
+        return np.inf if world is None or world.link_radius is None else float(np.nanmin(world.link_radius))
 
     def _refuse(self, chunk: int, path: str, values: Floats, bad: Any, rule: str) -> None:
         if bad.any():
@@ -218,8 +230,16 @@ class Plan:
         """Whether a game may end between the instants of the scenario's grid."""
         return self.termination == "continuous" or "horizon" in self.games or "step" in self.games
 
-    def play(self, inputs: Floats, threads: int | None, stop: Stop | None = None) -> Outcomes:
-        """Play the trials that have these inputs; the core refuses what is no game, and ends when ``stop`` is set."""
+    @cached_property
+    def world(self) -> World | None:
+        """What surrounds the game, as the core takes it; None for the paper's game."""
+        return core_world(self.scenario)
+
+    def play(self, inputs: Floats, first: int, threads: int | None, stop: Stop | None = None) -> Outcomes:
+        """Play the trials from ``first`` on, which have these inputs; the core refuses what is no game.
+
+        It ends when ``stop`` is set.
+        """
         setup = setups(self.scenario, self.quantities, inputs)
         starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
         continuous, passes = self.termination == "continuous", self.passes
@@ -238,7 +258,16 @@ class Plan:
             )
         else:
             kind, defender, time, diverged, passed = self.game.simulate_batch(
-                starts, sight, capture, continuous=continuous, passes=passes, threads=threads, stop=stop
+                starts,
+                sight,
+                capture,
+                continuous=continuous,
+                passes=passes,
+                threads=threads,
+                stop=stop,
+                world=self.world,
+                seed=self.seed,
+                first_trial=first,
             )
         return Outcomes(kind, defender, time, diverged, inputs, passed if self.passes else None)
 
@@ -255,7 +284,7 @@ class Plan:
         began = time.perf_counter()
         kept, tallies = [], []
         for chunk, rows in task.chunks():
-            outcomes = self.play(self.draw(chunk, rows), threads, stop)
+            outcomes = self.play(self.draw(chunk, rows), chunk * CHUNK, threads, stop)
             tallies.append(self.tally(outcomes))
             if task.keep != "counts":
                 kept.append(outcomes if task.keep == "all" else outcomes._replace(inputs=None))

@@ -37,7 +37,8 @@ from tadcore.errors import OutOfMemoryError
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath, short
 from tadcore.scenario.quantities import setups
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.statistics.stopping import Stopping
 
 from .collect import StoppingRule
@@ -61,7 +62,8 @@ class Study(Definition):
         Paths of positions, radii, weights, the horizon and the step, such as ``"attacker.position"``,
         ``"d1.visibility_radius"``, ``"d*.capture_radius"``, ``"*.position"`` or ``"attacker.control_weight"``, and how
         to draw them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
-        ``f(rng, size)``. With a wildcard every player draws for itself.
+        ``f(rng, size)``. With a wildcard every player draws for itself. It may be empty where the scenario itself is random,
+        by failures or disturbances: then every trial begins at the scenario's start.
     trials : int
         How many games.
     seed : int
@@ -90,6 +92,9 @@ class Study(Definition):
     equations are solved and its gains synthesised as it meets networks, some 10⁴ times the work. A game without an
     equilibrium is the outcome ``"no_equilibrium"``. Outcomes are counted at the steps of the scenario's own grid, each
     at the first at or after its end, and what ends later at the last. `games` says which way a study takes.
+
+    Failures and disturbances of trial i are drawn from (seed, i) alone, apart from the inputs: two studies with one
+    seed that differ in a radius, a weight or a mean time have them in common.
 
     The draws of the random design come from ``numpy.random.Philox``, keyed by (seed, chunk) and with the varied
     quantity in the counter; with one seed, two studies that vary the same position draw the same positions, whatever
@@ -340,7 +345,8 @@ class StudyResult(Trials):
         ScenarioError
             There is no such trial.
         """
-        return simulate(self.setup(trial), termination=self.termination)
+        row = as_index("trial", trial, self.trials - 1)
+        return simulate(self.setup(row), termination=self.termination, seed=self.seed, trial=row)
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> StudyResult:

@@ -56,15 +56,24 @@ def parse_study(text: str, name: str, folder: Path) -> dict[str, Any]:
             hint = similar(key, _KEYS) or f"the keys are {', '.join(_KEYS)}"
             raise ScenarioError(key, value, f"left out: a study has no such key; {hint}")
     for key in ("scenario", "trials", "vary"):
-        if key not in data:
+        if key not in data and (key != "vary" or not _is_random(data["scenario"], folder)):
             raise ScenarioError(key, MISSING, f"given: {_KEYS[key]}")
-    if not isinstance(data["vary"], dict):
-        raise ScenarioError("vary", data["vary"], _KEYS["vary"])
-    vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(data["vary"]).items()}
+    varied = data.get("vary", {})
+    if not isinstance(varied, dict):
+        raise ScenarioError("vary", varied, _KEYS["vary"])
+    vary = {name: from_table(f'vary["{name}"]', table) for name, table in _flat(varied).items()}
     options: dict[str, Any] = {
         key: data[key] for key in ("seed", "design", "termination", "passes", "keep") if key in data
     }
     return {"sc": _scenario(data["scenario"], folder), "vary": vary, "trials": data["trials"], **options}
+
+
+def _is_random(source: Any, beside: Path) -> bool:
+    """Whether a study needs to vary nothing; what is no scenario is refused when it is read as one."""
+    try:
+        return _scenario(source, beside).is_random
+    except ScenarioError:
+        return True
 
 
 def _scenario(source: Any, beside: Path) -> Scenario:

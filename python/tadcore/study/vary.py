@@ -32,6 +32,10 @@ def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, S
         if not matched:
             raise ScenarioError(field, path, _rule(sc, known, path))
         for quantity in (known[name] for name in matched):
+            if quantity.of_game and sc.world is not None:
+                way = f'tadcore.sweep(study, {{"{path}": [...]}})'
+                rule = f"a position or a radius where something fails, is told or is disturbed: {way} varies {path}"
+                raise ScenarioError(field, path, rule)
             for earlier, _, other in found.values():
                 if _same(earlier, quantity):
                     raise ScenarioError(field, quantity.path, f'varied once only: "{other}" varies it too')
@@ -51,6 +55,9 @@ def _rule(sc: Scenario, known: Mapping[str, Quantity], path: str) -> str:
     if expand(path, ["interaction"]):
         way = f'tadcore.sweep(study, {{"{path}": [...]}})'
         return f"a number: {way} plays both interactions"
+    if expand(path, sc.paths):
+        way = f'tadcore.sweep(study, {{"{path}": [...]}})'
+        return f"a position, a radius or a weight; {way} varies {path}"
     if sc.interaction == "I1" and normal(path) == "target.visibility_radius":
         return "left out: it belongs to interaction I2, and this is I1, where the target sees all"
     nearest = hint(path, wildcards(known))

@@ -97,11 +97,27 @@ def test_a_destination_that_is_no_folder_is_refused_before_the_game(tadcore, tmp
     assert "--out: got " in err
 
 
+def test_a_random_game_is_played_by_seed_and_trial(tadcore):
+    import tadcore as library
+
+    change = ("--set", "sensing.mean_time_to_failure=0.3")
+    code, out, _ = tadcore("simulate", "paper-i1", *change, "--seed", "7", "--trial", "3")
+    sc = library.scenarios.load("paper-i1").replace({"sensing.mean_time_to_failure": 0.3})
+    assert code == 0
+    assert str(library.simulate(sc, seed=7, trial=3).outcome) in out
+    assert "d1, d2, d3: sensor fails after 0.3 on average, for good" in out
+    assert "seed 7, trial 3" in out
+    assert "seed" not in tadcore("simulate", "paper-i1")[1]
+    code, _, err = tadcore("simulate", "paper-i1", "--seed", "-1")
+    assert code == 2
+    assert "seed: got -1" in err
+
+
 def test_a_game_without_equilibrium_leaves_with_1(tadcore, monkeypatch):
-    def escape(sc):
+    def escape(sc, **_options):
         raise NoEquilibriumError(0.119, sc.horizon, sc.step)
 
-    module = pytest.importorskip("tadcore.simulation.run")
+    module = pytest.importorskip("tadcore.simulation.play")
     monkeypatch.setattr(module, "simulate", escape)
     code, out, err = tadcore("simulate", "paper-i1")
     assert (code, out) == (1, "")

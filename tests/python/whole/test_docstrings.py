@@ -9,7 +9,7 @@ pytest.importorskip("tadcore._core")
 
 MODULES = ["", ".scenario.model", ".scenarios", ".game.equilibrium", ".game.network", ".game.synthesis"]
 MODULES += [
-    ".simulation.run",
+    ".simulation.play",
     ".simulation.batch",
     ".sampling.shapes",
     ".study.study",

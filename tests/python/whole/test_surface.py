@@ -46,7 +46,7 @@ def test_an_unknown_keyword_is_refused_everywhere():
     pytest.importorskip("tadcore._core")
     sc = tadcore.scenarios.load("paper-i1")
     for call in (
-        lambda: tadcore.simulate(sc, seed=1),
+        lambda: tadcore.simulate(sc, seeds=1),
         lambda: tadcore.simulate_batch(sc, [sc.positions], workers=2),
         lambda: tadcore.solve_equilibrium(sc, rtol=1e-9),
         lambda: tadcore.synthesize(sc, step=0, adjacency=[[0] * 4] * 3, warm=True),
