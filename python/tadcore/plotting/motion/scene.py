@@ -12,10 +12,10 @@ from matplotlib.patheffects import withStroke
 
 from tadcore._shared.arrays import Floats
 from tadcore.game.recorded import Recorded
-from tadcore.plotting.run.network import draw_graph
+from tadcore.plotting.run.network import aside, draw_graph
 from tadcore.plotting.run.paths import disc
 from tadcore.plotting.tools.inset import filled
-from tadcore.plotting.tools.style import edge_text, look, outcome_text
+from tadcore.plotting.tools.style import edge_text, look, outcome_text, world_text
 
 from .frames import Frame
 
@@ -44,6 +44,7 @@ class Scene:
         self._graph = self.figure.add_axes((0.69, 0.14, 0.3, 0.3 / _HEIGHT))
         self._clock = self.figure.text(0.07, 0.955, "", ha="left", va="center", family="monospace")
         self._event = self.figure.text(0.65, 0.955, "", ha="right", va="center")
+        self.figure.text(0.985, 0.03, world_text(run), ha="right", va="center", fontsize="x-small", color="0.3")
         self._seen: list[Line2D] = []
         self._network: object = None
         self._over = False
@@ -61,8 +62,10 @@ class Scene:
             _set(mover["trail"], path)
             _set(mover["recent"], path[since:])
             _set(mover["marker"], path[-1:])
+            blind = self._is_blind(p, k)
+            _set(mover["failure"], path[-1:] if blind else path[:0])
             if "sight" in mover:
-                self._look_around(mover, path[-1], float(self._radii[player]))
+                self._look_around(mover, path[-1], 0.0 if blind else float(self._radii[player]))
             name = mover["name"]
             if len(path[-1]) == 3:
                 name.set_position_3d(tuple(path[-1]))
@@ -92,6 +95,11 @@ class Scene:
         arena = [a for a in self._arena.get_children() if a is not self._arena.patch and a.get_zorder() >= lowest]
         return [*sorted(arena, key=lambda artist: artist.get_zorder()), self._clock, self._event]
 
+    def _is_blind(self, p: int, k: int) -> bool:
+        """Whether a player's sensor does not work at t_k."""
+        course = self._run.course
+        return course is not None and p < course.sensor_up.shape[1] and not bool(course.sensor_up[k, p])
+
     def _look_around(self, mover: dict[str, Any], centre: Floats, radius: float) -> None:
         """Put the disc of what a player sees around it; in space the level circle, where it is inside the box."""
         ring = np.zeros((len(_CIRCLE), len(centre)))
@@ -114,19 +122,23 @@ class Scene:
         new, lost = (set(change.added), set(change.removed)) if pause and now else (set(), set())
         for line in self._seen:
             line.remove()
-        self._seen = [self._sight_line(k, *edge) for edge in sorted(new)]
+        told, failed = aside(self._run, float(self._run.times[k]))
+        self._seen = [self._sight_line(k, *edge, dashed=edge in told) for edge in sorted(new)]
         texts = [edge_text(p, [q]) for p, q in sorted(new)] + [edge_text(p, [q], lost=True) for p, q in sorted(lost)]
         self._event.set_text(",  ".join(texts[:4]) + (" …" if len(texts) > 4 else ""))
-        if (now, pause) != self._network:
-            self._network = (now, pause)
+        state = (now, pause, frozenset(told), frozenset(failed))
+        if state != self._network:
+            self._network = state
             self._graph.clear()
-            draw_graph(self._graph, self._run.scenario.players, self._edges[now], new, lost)
-            self._graph.set_title("who sees whom")
+            draw_graph(self._graph, self._run.scenario.players, self._edges[now], new, lost, told=told, failed=failed)
+            reports = self._run.scenario.world is not None and self._run.scenario.world.talks
+            self._graph.set_title("who sees, or is told of, whom" if reports else "who sees whom")
 
-    def _sight_line(self, k: int, observer: str, seen: str) -> Line2D:
+    def _sight_line(self, k: int, observer: str, seen: str, *, dashed: bool) -> Line2D:
         names = self._run.scenario.players
         ends = self._where[k, [names.index(observer), names.index(seen)]]
-        (line,) = self._arena.plot(*ends.T, color="black", linewidth=1.4, zorder=2.8)
+        style = "--" if dashed else "-"
+        (line,) = self._arena.plot(*ends.T, color="black", linestyle=style, linewidth=1.4, zorder=2.8)
         return line
 
     def _make_arena(self) -> Axes:
@@ -157,7 +169,16 @@ class Scene:
             *nothing.T, linestyle="none", color=it.colour, marker=it.marker, markersize=size,
             markeredgecolor="white", markeredgewidth=0.7, zorder=3.2,
         )  # fmt: skip
-        mover: dict[str, Any] = {"trail": trail, "recent": recent, "marker": marker}
+        (failure,) = self._arena.plot(
+            *nothing.T,
+            linestyle="none",
+            color="black",
+            marker="x",
+            markersize=1.6 * size,
+            markeredgewidth=1.4,
+            zorder=3.3,
+        )
+        mover: dict[str, Any] = {"trail": trail, "recent": recent, "marker": marker, "failure": failure}
         if np.isfinite(self._radii.get(player, np.inf)):
             (mover["sight"],) = self._arena.plot(
                 *nothing.T, color=it.colour, linestyle=it.dashes, linewidth=0.8, alpha=0.7, zorder=1.5, scalex=False,

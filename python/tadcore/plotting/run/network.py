@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
-from tadcore.game.network import Edge
+from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_panels, as_run, new_panels
-from tadcore.plotting.tools.style import look, note, outcome_text
+from tadcore.plotting.tools.style import look, note, outcome_text, world_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +26,7 @@ _SMALL = 7.5  # points
 
 _OLD: dict[str, Any] = {"color": "0.62", "linewidth": 0.9, "linestyle": "-", "mutation_scale": 7, "zorder": 2.0}
 _NEW: dict[str, Any] = {"color": "black", "linewidth": 1.9, "linestyle": "-", "mutation_scale": 10, "zorder": 2.4}
+_TOLD: dict[str, Any] = {"linestyle": (0, (4.0, 1.6))}
 _LOST: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": ":", "mutation_scale": 7, "zorder": 1.8}
 
 
@@ -36,9 +37,10 @@ def network(
     r"""Draw the directed visibility graph, a panel per interval on which it does not change.
 
     An arrow from :math:`d_2` to :math:`a` says that :math:`d_2` sees the attacker. Edges that the change at the start
-    of the interval brought are thick and black, those that it took away are dotted, the others grey. Players stand
-    on a circle, the same in all panels: attacker and target on top, defenders in order below. Players who
-    see everything by assumption send no arrows.
+    of the interval brought are thick and black, those that it took away are dotted, the others grey. An edge is dashed
+    where the player does not see the other itself at the start of the interval, and is told by others; a player whose
+    sensor does not work then is grey. Players stand on a circle, the same in all panels: attacker and target on
+    top, defenders in order below. Players who see everything by assumption send no arrows.
 
     Parameters
     ----------
@@ -71,7 +73,8 @@ def network(
         edges = (edges | new) - lost
         last = k + 1 == len(changes)
         until = run.outcome.time if last else changes[k + 1].time
-        draw_graph(panels[k], run.scenario.players, edges, new if k else set(), lost)
+        told, failed = aside(run, time)
+        draw_graph(panels[k], run.scenario.players, edges, new if k else set(), lost, told=told, failed=failed)
         title = panels[k].set_title(f"$t\\in[{time:.6g},\\,{until:.6g}{']' if last else ')'}$")
         if panels[k].get_window_extent().width < _NARROW * panels[k].figure.dpi:
             title.set_fontsize(min(title.get_fontsize(), _SMALL))
@@ -82,9 +85,19 @@ def network(
     remarks = [f"and {len(changes) - shown} more"] if shown and shown < len(changes) else []
     if run.diverged is not None:
         remarks.append(outcome_text(run))
+    remarks += filter(None, [world_text(run)])
     if remarks and panels:
         note(panels[max(shown, 1) - 1], ", ".join(remarks))
     return axes
+
+
+def aside(run: Recorded, time: float) -> tuple[set[Edge], set[str]]:
+    """Return the edges that are told and not seen at an instant, and the players whose sensors do not work then."""
+    k = min(int(np.searchsorted(run.times, time)), len(run.times) - 1)
+    told = set(edges_of(run.adjacency[k] & ~run.seen[k], run.scenario.players))
+    if run.course is None:
+        return told, set()
+    return told, {run.scenario.constrained[i] for i in np.flatnonzero(~run.course.sensor_up[k])}
 
 
 def _places(names: Sequence[str]) -> dict[str, Floats]:
@@ -95,8 +108,17 @@ def _places(names: Sequence[str]) -> dict[str, Floats]:
     return {p: np.array([np.cos(a), np.sin(a)]) for p, a in zip(around, angle, strict=True)}
 
 
-def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge], lost: set[Edge]) -> None:
-    """Draw one graph, ``new`` edges thick and ``lost`` ones dotted."""
+def draw_graph(
+    ax: Axes,
+    names: Sequence[str],
+    edges: set[Edge],
+    new: set[Edge],
+    lost: set[Edge],
+    *,
+    told: Set[Edge] = frozenset(),
+    failed: Set[str] = frozenset(),
+) -> None:
+    """Draw one graph: ``new`` edges thick, ``lost`` ones dotted, ``told`` ones dashed; ``failed`` players grey."""
     at = _places(names)
     node = min(0.2, 0.8 * np.sin(np.pi / len(names)))
     ax.set(xlim=(-1.32, 1.32), ylim=(-1.32, 1.32), xticks=[], yticks=[])
@@ -105,6 +127,7 @@ def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge],
         spine.set(color="0.8", linewidth=0.5)
     for edge in sorted(edges | lost):
         kind = _LOST if edge in lost else _NEW if edge in new else _OLD
+        kind = kind | _TOLD if edge in told - lost else kind
         twin = (edge[1], edge[0]) in edges | lost
         _arrow(ax, at[edge[0]], at[edge[1]], node, bend=0.16 if twin else 0.0, kind=kind)
     for player, place in at.items():
@@ -117,7 +140,8 @@ def draw_graph(ax: Axes, names: Sequence[str], edges: set[Edge], new: set[Edge],
             va="center",
             fontsize="small",
             zorder=3.1,
-            bbox={"boxstyle": "circle,pad=0.22", "facecolor": "white", "edgecolor": it.colour, "linewidth": 1.1},
+            bbox={"boxstyle": "circle,pad=0.22", "edgecolor": it.colour, "linewidth": 1.1}
+            | ({"facecolor": "0.7", "linestyle": ":"} if player in failed else {"facecolor": "white"}),
         )
 
 

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from numpy.typing import NDArray
 
 from tadcore._shared.calls import public
+from tadcore.game.course import stretches
 from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes, root_figure
-from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, time_label
+from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, time_label, world_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,10 +28,11 @@ _ROW = 9.0  # points that one row with a name needs
 
 @public
 def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axes:
-    r"""Draw a raster of the visibility network: a row per edge, a bar wherever the edge is there.
+    r"""Draw a raster of the network: a row per edge, a bar wherever the edge is there.
 
     Rows are grouped by observer, d1 on top; bars are in the observer's colour. The row :math:`d_2\to a` says when
-    :math:`d_2` sees the attacker. Players who see everything by assumption have no rows.
+    :math:`d_2` sees the attacker. Players who see everything by assumption have no rows. Bars are hollow where a player
+    is told by others what it does not see itself, and its rows are grey while its sensor does not work.
 
     Parameters
     ----------
@@ -50,12 +53,14 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
     run = until_divergence(run)
     rows = _rows(run)
     ax = new_axes(ax, COLUMN, max(0.75 + _ROW * max(len(rows), 3) / 72.0, 1.3))
-    spans = bars_of(run)
+    seen, told = _bars(run, run.adjacency & run.seen), _bars(run, run.adjacency & ~run.seen)
     for row, edge in enumerate(rows):
-        bars = spans.get(edge, [])
         colour = look(edge[0]).colour
-        ax.broken_barh([(a, b - a) for a, b in bars], (row - 0.36, 0.72), color=colour, linewidth=0, zorder=2.0)
+        solid, hollow = ([(a, b - a) for a, b in bars.get(edge, [])] for bars in (seen, told))
+        ax.broken_barh(solid, (row - 0.36, 0.72), color=colour, linewidth=0, zorder=2.0)
+        ax.broken_barh(hollow, (row - 0.24, 0.48), facecolor="white", edgecolor=colour, linewidth=0.8, zorder=1.9)
         ax.axhline(row, color=colour, linewidth=0.4, alpha=0.5, zorder=1.0)
+    failed = _shade_failures(ax, run, rows)
     for row in range(1, len(rows)):
         if rows[row][0] != rows[row - 1][0]:
             ax.axhline(row - 0.5, color="0.4", linewidth=0.5, zorder=1.1)
@@ -70,23 +75,37 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
         lines.set_linestyle((0, (4, 2.5)))
         ax.add_collection(lines, autolim=False)
     absent = len(run.scenario.constrained) * (run.scenario.n + 1) - len(rows)
-    if absent:
-        note(ax, f"{absent} edges never form and are left out")
+    remarks = [f"{absent} edges never form and are left out"] if absent else []
+    remarks += ["hollow: told by others"] if told else []
+    remarks += ["grey: the sensor has failed"] if failed else []
+    if words := "\n".join(filter(None, ["; ".join(remarks), world_text(run)])):
+        note(ax, words)
     return ax
+
+
+def _shade_failures(ax: Axes, run: Recorded, rows: list[Edge]) -> bool:
+    """Shade the rows of an observer while its sensor does not work; whether there is anything to shade."""
+    if run.course is None:
+        return False
+    down = stretches(~run.course.sensor_up, run.times)
+    for (i,), spans in down.items():
+        own = [row for row, (observer, _) in enumerate(rows) if observer == run.scenario.constrained[i]]
+        if own:
+            band = (min(own) - 0.5, len(own))
+            ax.broken_barh([(a, b - a) for a, b in spans], band, color="0.82", linewidth=0, zorder=0.5)
+    return bool(down)
 
 
 def bars_of(run: Recorded) -> dict[Edge, list[tuple[float, float]]]:
     """Return, for each edge that ever forms, the stretches of time over which it is there."""
+    return _bars(run, run.adjacency)
+
+
+def _bars(run: Recorded, edges: NDArray[np.bool_]) -> dict[Edge, list[tuple[float, float]]]:
     players, attacker = run.scenario.players, run.scenario.n + 1
-    in_force = run.adjacency[:-1].astype(np.int8)
-    starts = np.diff(in_force, axis=0, prepend=0) > 0
-    ends = np.diff(in_force, axis=0, append=0) < 0
-    spans: dict[Edge, list[tuple[float, float]]] = {}
-    for i, j in np.argwhere(starts.any(axis=0)).tolist():
-        first, last = np.flatnonzero(starts[:, i, j]), np.flatnonzero(ends[:, i, j]) + 1
-        edge = players[i], players[attacker if i == j else j]
-        spans[edge] = list(zip(run.times[first].tolist(), run.times[last].tolist(), strict=True))
-    return spans
+    return {
+        (players[i], players[attacker if i == j else j]): spans for (i, j), spans in stretches(edges, run.times).items()
+    }
 
 
 def _rows(run: Recorded) -> list[Edge]:

@@ -15,7 +15,7 @@ from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_axes, as_run, new_axes
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
-from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text
+from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text, world_text
 
 from .paths import count_passes, disc, drops, name_runs, passes, paths
 
@@ -123,7 +123,7 @@ def trajectories(
     lost = [r for r in shown if r.diverged is not None]
     said = [outcome_text(lost[0])] if lost and (full is not None or not title) else []
     said += [count_passes(run)] if run.passes else []
-    if said:
+    if said := [*said, *filter(None, [world_text(run)])]:
         note(ax, "; ".join(said))
     return ax
 

@@ -115,6 +115,19 @@ def outcome_text(run: Recorded) -> str:
     return f"no capture until {at}"
 
 
+def world_text(run: Recorded) -> str:
+    """What surrounds the game in a few words, with what it was drawn from; empty for the paper's game."""
+    world = run.scenario.world
+    if run.course is None:
+        return ""
+    outside = ["a network from outside"] if run.course.from_outside else []
+    if world is None:
+        return ", ".join(outside)
+    there = {"failures": world.fails, "reports": world.talks, "disturbances": world.shakes}
+    drawn = [f"seed {run.course.seed}", f"trial {run.course.trial}"] if world.is_random else []
+    return ", ".join([*(word for word, is_there in there.items() if is_there), *outside, *drawn])
+
+
 @contextmanager
 def style() -> Iterator[None]:
     """Set type and line weights as a two-column journal prints them, inside a ``with`` block only.
