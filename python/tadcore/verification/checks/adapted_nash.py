@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tadcore._shared.arrays import Floats
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.verification.checks.steps import refined
 from tadcore.verification.oracle.adapted import Adapted
 from tadcore.verification.oracle.draws import generator

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tadcore.game.course import ARRAYS, shapes as course_shapes
 from tadcore.simulation.run import Run
 from tadcore.verification.report import Check
 
@@ -32,12 +33,18 @@ def _arrays(run: Run) -> list[str]:
         "theta": (rows,),
         "theta_terms": (rows, terms),
     }
+    arrays = {name: getattr(run, name) for name in shapes}
+    if (run.course is None) != (sc.world is None):
+        return ["the course of the scenario's failures, links and disturbances is missing, or there are none"]
+    if run.course is not None:
+        shapes |= course_shapes(sc, rows)
+        arrays |= {name: getattr(run.course, name) for name in ARRAYS}
     faults = []
     if not 1 <= rows <= sc.steps + 1:
         faults.append(f"times has {rows} rows where 1 to {sc.steps + 1} are possible")
     for name, shape in shapes.items():
-        array = getattr(run, name)
-        kind = np.bool_ if name == "adjacency" else np.float64
+        array = arrays[name]
+        kind = np.bool_ if name in ("adjacency", "seen", "sensor_up", "edge_up", "heard") else np.float64
         if not isinstance(array, np.ndarray) or array.dtype != kind:
             faults.append(f"{name} is no array of {kind.__name__.rstrip('_')}")
         elif array.shape != shape:

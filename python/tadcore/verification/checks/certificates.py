@@ -8,7 +8,8 @@ import numpy as np
 
 from tadcore.errors import TadcoreError
 from tadcore.game.synthesis import synthesize
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.verification.oracle.optimality import CRITICAL, Optimality
 from tadcore.verification.report import Check
 
@@ -37,7 +38,7 @@ def check_synthesis(run: Run) -> Check:
     """How far the gains are from the library's own synthesis, and by how much its counts are off."""
     claim = RECORD["record.synthesis"]
     try:
-        again = simulate(run.scenario)
+        again = simulate(run.scenario, seed=run.seed, trial=run.trial)
         if not np.array_equal(again.adjacency, run.adjacency):  # another path: ask row by row
             again = _row_by_row(run)
     except (ArithmeticError, TadcoreError) as error:

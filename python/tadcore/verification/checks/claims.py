@@ -69,6 +69,37 @@ _ALL = (
 RECORD = {claim.name: claim for claim in _ALL}
 """The claims by name, in the order in which they are checked."""
 
+_AROUND = (
+    Claim(
+        "record.failures",
+        0.0,
+        "sensors and edges do not fail when this seed and trial say: another trial, or other mean times, was played",
+        "",
+    ),
+    Claim(
+        "record.seen",
+        1e-13,
+        "what is seen is not that of the distances, the visibility radii and the failures",
+        "eq:limob",
+    ),
+    Claim(
+        "record.contacts",
+        1e-13,
+        "who hears whom is not that of the distances, the radii of communication and the links of this trial",
+        "",
+    ),
+    Claim("record.relay", 0.0, "the network in use is not what each player sees and is told", "eq:extadj"),
+    Claim(
+        "record.displacement",
+        1e-12,
+        "the players are not displaced as this seed and trial say: another trial, or another ς, was played",
+        "",
+    ),
+)
+
+AROUND = {claim.name: claim for claim in _AROUND}
+"""The claims, in the place of ``record.network``, of a run with failures, links or disturbances."""
+
 BY_POSITIONS_ALONE = frozenset(
     {
         "record.arrays",
@@ -78,6 +109,7 @@ BY_POSITIONS_ALONE = frozenset(
         "record.admissible",
         "record.outcome",
         "record.divergence",
+        *AROUND,
     }
 )
 """The checks that do not read P(t)."""

@@ -16,7 +16,8 @@ from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.scenario.model import Scenario
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.verification.oracle.draws import generator
 from tadcore.verification.oracle.frozen import frozen_steps
 from tadcore.verification.oracle.matrices import matrices_of, stacked_rows
@@ -36,7 +37,9 @@ def off_the_line(run: Run) -> float:
     return float(np.abs(across).max() / max(np.abs(pair).max(), 1e-300))
 
 
-def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[int, bool]:
+def radius_delay(
+    sc: Scenario, player: str, one: float, other: float, *, seed: int = 0, trial: int = 0
+) -> tuple[int, bool]:
     """Compare the games under two visibility radii of one player.
 
     Parameters
@@ -47,6 +50,8 @@ def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[i
         A player with limited sight.
     one, other : float
         Its two radii.
+    seed, trial : int
+        Of failures and disturbances, the same in both games.
 
     Returns
     -------
@@ -63,14 +68,15 @@ def radius_delay(sc: Scenario, player: str, one: float, other: float) -> tuple[i
     if player not in sc.constrained:
         raise ScenarioError("player", player, f"one of {', '.join(sc.constrained)}")
     i = sc.constrained.index(player)
-    runs = [simulate(sc.replace({f"{player}.visibility_radius": radius})) for radius in (one, other)]
+    games = [sc.replace({f"{player}.visibility_radius": radius}) for radius in (one, other)]
+    runs = [simulate(game, seed=seed, trial=trial) for game in games]
     first = min(_first_edge(run, i) for run in runs)
     records = ((runs[0].position, runs[1].position), (runs[0].control, runs[1].control))
     return first, all(np.array_equal(x[:first], y[:first]) for x, y in records)
 
 
 def _first_edge(run: Run, i: int) -> int:
-    sees = run.adjacency[:-1, i].any(axis=1)
+    sees = run.seen[:-1, i].any(axis=1)
     return int(np.argmax(sees)) if sees.any() else len(run.times) - 1
 
 
@@ -132,7 +138,9 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
     sc = run.scenario
     rounded = _rounding(run, float(np.abs(run.position).max()))
     checks, notes = [], []
-    if sc.interaction == "I1" and sc.attacker.evasion == 0.0:
+    world = sc.world
+    shaken, random = world is not None and world.shakes, sc.is_random
+    if sc.interaction == "I1" and sc.attacker.evasion == 0.0 and not shaken:
         remedy = "a suicidal attacker and its target must stay on their line: P_τ or P_a reaches beyond the target"
         claim = Claim("geometry.line", _LINE, remedy, "thm:straight_line")
         checks.append(claim.judge(off_the_line(run), doubt=rounded))
@@ -142,7 +150,8 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
         nearest = float(np.delete(apart[i], i).min())  # below it nobody is seen at the start
         least = 1.001 * float(sc.capture_radii[i]) if i < sc.n else 0.0
         if nearest > 2.0 * least:
-            first, same = radius_delay(sc, player, max(0.4 * nearest, least), 0.9 * nearest)
+            radii = max(0.4 * nearest, least), 0.9 * nearest
+            first, same = radius_delay(sc, player, *radii, seed=run.seed, trial=run.trial)
             compared += first
             differing += not same
     if compared:
@@ -161,13 +170,17 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
     still, none = np.eye(sc.dim), np.zeros(sc.dim)
     remedy = "the result depends on the frame: report this scenario"
     for name, U, by in (("rotation", turn, none), ("reflection", mirror, none), ("translation", still, shift)):
-        other_run = simulate(moved(sc, U, by))
+        if shaken and name != "translation":  # displacements would have to be turned too
+            continue
+        other_run = simulate(moved(sc, U, by), seed=run.seed, trial=run.trial)
         expected = run.position @ U.T + by
         gap = unlike(run, other_run, expected, run.outcome.defender)
         doubt = _rounding(run, float(np.abs(expected).max()))
         claim = Claim(f"geometry.{name}", _SAME, remedy, "eq:stateequation")
         checks.append(claim.judge(gap, doubt=doubt if margin > max(_DECIDED, doubt) else np.inf))
-    if sc.n > 1:
+    if random:
+        notes.append("failures and disturbances are drawn by player and axis: no symmetry exchanges these")
+    elif sc.n > 1:
         order = list(range(sc.n))[::-1]
         other_run = simulate(relabelled(sc, order))
         winner = None if run.outcome.defender is None else order.index(run.outcome.defender)
@@ -207,4 +220,7 @@ def _margin(run: Run) -> float:
     sight = np.abs(distance[:-1, :m] - sc.visibility_radii[:, None])
     sight[:, np.arange(m), np.arange(m)] = np.inf
     extent = max(float(distance.max()), 1e-300)
-    return min(float(capture.min()), float(sight.min(initial=np.inf))) / extent
+    margins = [capture, sight]
+    if sc.world is not None and sc.world.link_radius is not None:
+        margins.append(np.abs(distance[:-1, :m, :m] - sc.world.link_radius)[:, ~np.eye(m, dtype=bool)])
+    return min(float(np.nanmin(margin, initial=np.inf)) for margin in margins) / extent

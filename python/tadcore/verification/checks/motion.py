@@ -57,6 +57,10 @@ def check_motion(run: Run, m: Matrices, rows: Floats) -> list[Check]:
     rounded = 4.0 * _EPS * (gain * reach[:-1] + reach[1:])
     doubt = DOUBT * np.maximum(stiffness(loop, step), 1.0)
     moved = transition[:, :, :size] @ z[:-1]
+    if run.course is not None:
+        shock = run.course.displacement[:-1]
+        moved[:, :size] += shock[:, :-1] - shock[:, -1:]
+        moved[:, size] += shock[:, -1]
     found = []
     for name, off in (
         ("record.motion", np.abs(z[1:] - moved[:, :size]).max(axis=(1, 2))),

@@ -13,6 +13,7 @@ from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, 
 from tadcore.verification.oracle.optimality import optimality
 from tadcore.verification.report import VerificationReport
 
+from .around import check_around
 from .arrays import check_arrays
 from .certificates import check_certified, check_synthesis
 from .ending import check_divergence, check_outcome, check_start, check_times
@@ -33,7 +34,8 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     Returns
     -------
     VerificationReport
-        Start, instants and end from the scenario; the network from the distances; gains within what the network shows,
+        Start, instants and end from the scenario; the network from the distances, and from the draws of its trial where
+        something fails or is told; gains within what the network shows,
         controls, motion, Θ and costs from the gains and P; the terminal row; the number of proofs. Of a record that is
         not whole, only that.
     """
@@ -45,7 +47,8 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     rows = stacked_rows(equilibrium.feedback, run.scenario.players)[:length]
     rows[:, : run.gains.shape[1]] = run.gains
     checks = [whole, check_start(run), check_times(run), check_outcome(run), check_divergence(run)]
-    checks += [check_network(run), check_admissible(run)]
+    checks += [check_network(run)] if run.course is None else check_around(run)
+    checks += [check_admissible(run)]
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows decides nothing
         if length > 1:
             checks += [*check_motion(run, m, rows), check_control(run, rows), check_theta(run, m, values)]

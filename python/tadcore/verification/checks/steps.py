@@ -23,7 +23,8 @@ from tadcore.game.passes import Pass
 from tadcore.scenario.model import Scenario
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
 _SHOWN = 5

@@ -112,7 +112,7 @@ def check_last_row(run: Run, m: Matrices, values: Floats, rows: Floats, found: O
     if len(run.times) > 1:
         changed = float((network[0] != run.adjacency[-2]).any())
     else:
-        changed = float(network_errors(run.scenario, run.position[last], network).max())
+        changed = 0.0 if run.course else float(network_errors(run.scenario, run.position[last], network).max())
     parts = {
         "network": changed / RECORD["record.network"].bound,
         "gains beyond sight": float(unseen(gains, network).max()) / RECORD["record.admissible"].bound,

@@ -17,7 +17,8 @@ from tadcore._shared.arrays import Floats
 from tadcore._shared.shares import share
 from tadcore.game.network import Edge
 from tadcore.scenarios.given import ScenarioLike
-from tadcore.simulation.run import Run, simulate
+from tadcore.simulation.play import simulate
+from tadcore.simulation.run import Run
 from tadcore.verification.checks.steps import refined
 
 from .events import play_by_events
