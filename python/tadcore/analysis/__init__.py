@@ -8,6 +8,7 @@ from .placement import BestStart, best_start
 from .probabilities import ProbabilityMap, probability_map
 from .radius import radius_curve
 from .sensitivities import sensitivity
+from .starts import start_share
 from .sweeps import SweepResult, sweep
 
 __all__ = [
@@ -23,5 +24,6 @@ __all__ = [
     "radius_curve",
     "sensitivity",
     "sobol",
+    "start_share",
     "sweep",
 ]

@@ -11,6 +11,7 @@ from .outcomes import TrialOutcomes, outcome_counts, outcome_names
 from .radius import RadiusCurve
 from .sequences import HalfWidth, mixture_interval
 from .single_radii import Breakpoints, SmallestRadius
+from .starts import StartShare, start_share_of
 from .stopping import Stopping
 from .tally import Tally
 
@@ -22,6 +23,7 @@ __all__ = [
     "OutcomeProbabilities",
     "RadiusCurve",
     "SmallestRadius",
+    "StartShare",
     "Stopping",
     "Tally",
     "TrialOutcomes",
@@ -36,4 +38,5 @@ __all__ = [
     "probabilities",
     "probabilities_of",
     "proportion_interval",
+    "start_share_of",
 ]
