@@ -25,9 +25,9 @@ from tadcore.statistics.outcomes import indicators, outcome_names
 from tadcore.statistics.sobol import Distribution, Joint, Sensitivity, sobol
 from tadcore.study.vary import quantities
 
-_LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open unit cube
-
 from .replays import refuse_random
+
+_LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open unit cube
 
 
 @public

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -170,9 +170,15 @@ def simulate_batch(
     ending, looking = as_termination(termination), as_flag("passes", passes)
     game = game_of(sc)
     refuse_between(sc, ending, passes=looking)
-    world = core_world(sc)
-    outer: dict[str, Any] = {} if world is None else {"world": world, **key}
     kind, defender, time, diverged, passed = game.simulate_batch(
-        starts, sight, capture, continuous=ending == "continuous", passes=looking, threads=workers, **outer
+        starts,
+        sight,
+        capture,
+        continuous=ending == "continuous",
+        passes=looking,
+        threads=workers,
+        world=core_world(sc),
+        seed=key["seed"],
+        first_trial=key["first_trial"],
     )
     return Batch(kind, defender, time, diverged, passed if looking else None, sc.n)

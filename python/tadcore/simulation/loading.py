@@ -99,9 +99,10 @@ def _unpacked(data: xr.Dataset, name: str) -> Run:
 def _course(data: xr.Dataset, kept: Any) -> Course | None:
     if kept is None:
         return None
-    if not isinstance(kept, dict) or set(kept) != set(OF_COURSE) or not all(VARIABLES.get(name, name) in data for name in ARRAYS):
+    names = {name: VARIABLES.get(name, name) for name in ARRAYS}
+    if not isinstance(kept, dict) or set(kept) != set(OF_COURSE) or not set(names.values()) <= set(data):
         raise ValueError("its course is not whole")
-    arrays = {name: np.ascontiguousarray(data[VARIABLES.get(name, name)].values) for name in ARRAYS}
+    arrays = {name: np.ascontiguousarray(data[variable].values) for name, variable in names.items()}
     return Course(as_seed(kept["seed"]), as_trial("trial", kept["trial"]), **arrays, from_outside=kept["from_outside"])
 
 

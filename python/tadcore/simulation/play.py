@@ -8,8 +8,6 @@ disturbed, the network is what is left of sight and what is told, and every step
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -96,18 +94,25 @@ def simulate(
     >>> [change.time for change in run.network_changes]
     [0.0, 0.16, 0.49, 0.575, 0.915, 0.96]
     """
-    rule: dict[str, Any] = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
+    rule = {"hysteresis": as_amount("hysteresis", hysteresis), "dwell": as_amount("dwell", dwell)}
     ending = as_termination(termination)
     key = {"seed": as_seed(seed), "trial": as_trial("trial", trial)}
     decide = as_network(network)
     sc = as_scenario(sc)
     game = game_of(sc)
     refuse_between(sc, ending)
-    world = core_world(sc)
-    outer: dict[str, Any] = {} if world is None else {"world": world, **key}
-    outer |= {} if decide is None else {"network": decide}
-    continuous = ending == "continuous"
-    record = game.simulate(sc.positions, sc.visibility_radii, sc.capture_radii, **rule, continuous=continuous, **outer)
+    record = game.simulate(
+        sc.positions,
+        sc.visibility_radii,
+        sc.capture_radii,
+        hysteresis=rule["hysteresis"],
+        dwell=rule["dwell"],
+        continuous=ending == "continuous",
+        world=core_world(sc),
+        seed=key["seed"],
+        trial=key["trial"],
+        network=decide,
+    )
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
         scenario=sc,

@@ -62,8 +62,8 @@ class Study(Definition):
         Paths of positions, radii, weights, the horizon and the step, such as ``"attacker.position"``,
         ``"d1.visibility_radius"``, ``"d*.capture_radius"``, ``"*.position"`` or ``"attacker.control_weight"``, and how
         to draw them: a sampler of `tadcore.sampling`, a frozen distribution of `scipy.stats`, a sequence, or a callable
-        ``f(rng, size)``. With a wildcard every player draws for itself. It may be empty where the scenario itself is random,
-        by failures or disturbances: then every trial begins at the scenario's start.
+        ``f(rng, size)``. With a wildcard every player draws for itself. It may be empty where the scenario itself is
+        random, by failures or disturbances: then every trial begins at the scenario's start.
     trials : int
         How many games.
     seed : int

@@ -89,6 +89,8 @@ def run_of(sc: ScenarioLike, times: ArrayLike, position: ArrayLike, *, control: 
         gains=np.zeros((rows, m, size)),
         theta=np.zeros(rows),
         theta_terms=np.zeros((rows, len(theta_terms(game.interaction)))),
+        seen=adjacency,
+        course=None,
         passes=(),
         network_changes=changes_of(instants[:-1], adjacency[:-1], game.players),
     )
