@@ -38,7 +38,7 @@ def compare(
     runs_of = read(scenario, changes), read(other, None)
     from tadcore import plotting
     from tadcore.plotting.tools.axes import for_files, root_figure
-    from tadcore.simulation.run import simulate
+    from tadcore.simulation.play import simulate
 
     first, second = (simulate(sc) for sc in runs_of)
     say(f"{scenario}: {first.outcome}")
@@ -67,7 +67,7 @@ def animate(
     hush(quiet)
     _suffix(out, _FILMS)
     sc = read(scenario, changes)
-    from tadcore.simulation.run import simulate
+    from tadcore.simulation.play import simulate
 
     run = simulate(sc)
     say(str(run.outcome))
