@@ -77,6 +77,10 @@ def _arguments(sc: Scenario) -> dict[str, Any]:
         "evasion_terminal_weight": tuple(d.evasion_terminal_weight for d in team),
         "synthesis_weights": sc.synthesis_weights,
     }
+    if sc.feedback == "receding":
+        arguments["prediction_horizon"] = sc.prediction_horizon
+    if sc.criterion == "component":
+        arguments["criterion"] = sc.criterion
     if sc.interaction == "I1":
         arguments |= {
             "defender_running_weight": tuple(d.running_weight for d in team),

@@ -81,6 +81,14 @@ class Scenario(CheckedModel):
         default_factory=lambda data: _equal_weights(data.get("interaction", "I1")),
         description="γ, weights of the terms of Θ: four in I1, three in I2; equal by default",
     )
+    feedback: Literal["finite", "receding"] | None = Field(
+        default=None, description='"finite": P(t) up to T (the default); "receding": P of one prediction horizon'
+    )
+    prediction_horizon: Positive | None = Field(default=None, description="T_h, how far ahead P looks (receding only)")
+    criterion: Literal["paper", "component"] | None = Field(
+        default=None,
+        description='"paper": Θ over all rows (the default); "component": who knows all plays its equilibrium row',
+    )
     sensing: Sensing | None = Field(default=None, description="the [sensing] table: failures of sensors and edges")
     communication: Communication | None = Field(
         default=None, description="the [communication] table: links between the players with limited sight"
@@ -148,6 +156,11 @@ class Scenario(CheckedModel):
     def world(self) -> World | None:
         """What may fail, who may be told and what is disturbed; None where nothing is, which is the paper's game."""
         return world_of(self)
+
+    @property
+    def is_variant(self) -> bool:
+        """Whether feedback or criterion are not the paper's: a receding horizon, or the team criterion."""
+        return self.feedback == "receding" or self.criterion == "component"
 
     @property
     def is_random(self) -> bool:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tadcore._shared.limits import can_be_told, sees_whom_it_intercepts, too_far
+from tadcore.errors import MISSING
 
 from . import worlds
 from .fields import Problem
@@ -21,7 +22,8 @@ _DIVISION_TOLERANCE = 1e-9
 
 def problems(sc: Shape) -> list[Problem]:
     """Everything that is wrong; ranges and worlds are looked at only where each part by itself is right."""
-    return [*_of_the_grid(sc), *(_of_the_parts(sc) or [*_of_the_ranges(sc), *worlds.problems(sc)])]
+    found = _of_the_parts(sc) or [*_of_the_ranges(sc), *worlds.problems(sc)]
+    return [*_of_the_grid(sc), *_of_the_feedback(sc), *found]
 
 
 def _of_the_grid(sc: Shape) -> list[Problem]:
@@ -31,6 +33,18 @@ def _of_the_grid(sc: Shape) -> list[Problem]:
         return [(("step",), sc.step, f"at least the horizon ({sc.horizon!r}) over {_MOST_STEPS:,}")]
     if steps < 1 or abs(ratio - steps) > _DIVISION_TOLERANCE * steps:
         return [(("step",), sc.step, f"a divisor of the horizon ({sc.horizon!r})")]
+    return []
+
+
+def _of_the_feedback(sc: Shape) -> list[Problem]:
+    receding, ahead = sc.feedback == "receding", sc.prediction_horizon
+    if receding and ahead is None:
+        return [(("prediction_horizon",), MISSING, "given: T_h, how far ahead P looks under a receding horizon")]
+    if ahead is not None and not receding:
+        return [(("prediction_horizon",), ahead, 'left out: feedback is not "receding"')]
+    if sc.criterion == "component" and len(sc.constrained) == 1:
+        rule = f'left out, or "paper": {sc.constrained[0]} is the only player with limited sight, and both say the same'
+        return [(("criterion",), sc.criterion, rule)]
     return []
 
 

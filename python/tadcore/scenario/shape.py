@@ -30,6 +30,18 @@ class Shape(Protocol):
         """γ."""
 
     @property
+    def feedback(self) -> Literal["finite", "receding"] | None:
+        """Up to which end P looks."""
+
+    @property
+    def prediction_horizon(self) -> float | None:
+        """T_h."""
+
+    @property
+    def criterion(self) -> Literal["paper", "component"] | None:
+        """What is minimised."""
+
+    @property
     def sensing(self) -> Sensing | None:
         """The table of failures."""
 

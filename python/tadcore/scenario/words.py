@@ -20,6 +20,10 @@ def describe(sc: Shape) -> str:
     lines = [_NAMES[sc.interaction], f"T = {sc.horizon:g}, δ = {sc.step:g}, {sc.steps} steps, {sc.dim} axes"]
     if sc.interaction == "I1":
         lines[0] += f" (λ = {sc.attacker.evasion:g})"
+    if sc.feedback == "receding":
+        lines.append(f"receding horizon: P looks T_h = {sc.prediction_horizon:g} ahead throughout")
+    if sc.criterion == "component":
+        lines.append("team criterion: whoever knows everything plays its row of the equilibrium")
     gamma = sc.synthesis_weights
     if len(set(gamma)) > 1:
         lines.append(f"γ = ({', '.join(f'{g:g}' for g in gamma)})")

@@ -119,6 +119,17 @@ class Run:
         """What each player saw itself, shape (L + 1, m, N) as ``adjacency``, which it is where nobody reports."""
         return self.adjacency if self.course is None else self.course.seen
 
+    @cached_property
+    def theta_price(self) -> Floats:
+        """The price of team consistency, shape (L,): Θ under the criterion "component" less Θ under "paper".
+
+        At every instant with a network in force, 0 where nobody, or everybody, knows everything.
+        """
+        from tadcore.game.compiled import game_of
+
+        in_force = len(self.times) - 1
+        return game_of(self.scenario).theta_price(np.arange(in_force), self.adjacency[:in_force])
+
     @property
     def relayed(self) -> NDArray[np.bool_]:
         """What players knew by reports alone, shape (L + 1, m, N)."""

@@ -32,9 +32,10 @@ def quantities(sc: Scenario, vary: Mapping[str, Any]) -> tuple[tuple[Quantity, S
         if not matched:
             raise ScenarioError(field, path, _rule(sc, known, path))
         for quantity in (known[name] for name in matched):
-            if quantity.of_game and sc.world is not None:
+            if quantity.of_game and (sc.world is not None or sc.is_variant):
                 way = f'tadcore.sweep(study, {{"{path}": [...]}})'
-                rule = f"a position or a radius where something fails, is told or is disturbed: {way} varies {path}"
+                here = "with failures, reports, disturbances, a receding horizon or the team criterion"
+                rule = f"a position or a radius {here}: {way} varies {path}"
                 raise ScenarioError(field, path, rule)
             for earlier, _, other in found.values():
                 if _same(earlier, quantity):

@@ -92,6 +92,9 @@ def verify(
     if isinstance(given, Run) and given.variant:
         raise ScenarioError("sc_or_run", f"a run with {given.variant}", "a run of the paper's game, without any")
     sc = given.scenario if isinstance(given, Run) else given
+    if sc.is_variant:
+        rule = 'a game with feedback "finite" and criterion "paper": the checks are of the paper\'s P(t) and Θ'
+        raise ScenarioError("sc_or_run", "a game with a receding horizon or the team criterion", rule)
     try:
         run = given if isinstance(given, Run) else simulate(given)
         equilibrium = solve_equilibrium(sc)

@@ -253,3 +253,26 @@ def test_a_description_says_what_surrounds_the_game():
     assert "d2, d3: heard by nobody" in free
     assert "reports: what is seen, and the own place in a common frame; passed on by any number" in free
     assert "random" not in free
+
+
+def test_feedback_and_criterion():
+    sc = I1.replace({"feedback": "receding", "prediction_horizon": 2.0, "criterion": "component"})
+    assert Scenario.from_toml_string(sc.to_toml()) == sc
+    assert "receding horizon: P looks T_h = 2 ahead throughout" in sc.describe()
+    assert "team criterion: whoever knows everything plays its row of the equilibrium" in sc.describe()
+    assert not {"feedback", "prediction_horizon", "criterion"} & tomllib.loads(I1.to_toml()).keys()
+    assert sc.replace({"feedback": None, "prediction_horizon": None, "criterion": None}).to_toml() == I1.to_toml()
+    assert I1.replace(criterion="paper").describe() == I1.replace(feedback="finite").describe() == I1.describe()
+    for changes, field, words in (
+        ({"feedback": "receding"}, "prediction_horizon", "must be given"),
+        ({"prediction_horizon": 2.0}, "prediction_horizon", 'feedback is not "receding"'),
+        ({"feedback": "receding", "prediction_horizon": 0.0}, "prediction_horizon", "a positive finite number"),
+        ({"feedback": "infinite"}, "feedback", '"finite" or "receding"'),
+        ({"criterion": "team"}, "criterion", '"paper" or "component"'),
+    ):
+        with pytest.raises(ScenarioError) as caught:
+            I1.replace(changes)
+        assert caught.value.field == field
+        assert words in str(caught.value)
+    with pytest.raises(ScenarioError, match="d1 is the only player with limited sight"):
+        ALONE.replace(criterion="component")

@@ -385,3 +385,28 @@ def test_a_sampled_cost_is_read_back_from_the_record():
     assert report.ok, report
     spoilt = dataclasses.replace(tadcore.simulate(I1.replace(ALL), seed=8), costs={"defenders": 1.0})
     assert not tadcore.verification.check_record(spoilt, tadcore.solve_equilibrium(I1)).ok
+
+
+# ---- the team criterion and receding horizons, by their fields
+
+
+def test_the_fields_of_feedback_and_criterion_reach_the_game():
+    team = tadcore.simulate(I1.replace(criterion="component"))
+    plain = tadcore.simulate(I1)
+    assert np.array_equal(team.gains[0, 0], tadcore.solve_equilibrium(I1).feedback["d1"][0])  # d1 sees all
+    assert not np.array_equal(plain.gains[0, 0], team.gains[0, 0])
+    assert team.theta[0] - tadcore.synthesize(I1, step=0, adjacency=team.adjacency[0]).theta == pytest.approx(
+        team.theta_price[0], rel=1e-9
+    )
+    assert (plain.theta_price >= -1e-9 * plain.theta[:-1]).all()
+    assert plain.theta_price.shape == (len(plain.times) - 1,)
+    ahead = I1.replace({"feedback": "receding", "prediction_horizon": 2.0})
+    P = tadcore.solve_equilibrium(ahead).P["defenders"]
+    expected = tadcore.solve_equilibrium(I1.replace({"horizon": 2.0})).P["defenders"][0]
+    assert np.allclose(P, expected, rtol=1e-9)
+    for sc in (ahead, I1.replace(criterion="component")):
+        assert tadcore.simulate_batch(sc, [sc.positions])[0] == tadcore.simulate(sc).outcome
+        with pytest.raises(ScenarioError, match="receding horizon or the team criterion"):
+            tadcore.verify(sc)
+        with pytest.raises(ScenarioError, match=r"tadcore.sweep"):
+            tadcore.Study(sc, {"attacker.control_weight": [1.0, 1.1]}, trials=2)
