@@ -6,7 +6,7 @@ import contextlib
 import math
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -97,6 +97,13 @@ class Plan:
     termination: Termination = "sampled"
     passes: bool = False
     _one_at_a_time: threading.Lock = field(default_factory=threading.Lock, init=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What it was made from: the lock, the compiled game and what else follows are made again."""
+        return {item.name: getattr(self, item.name) for item in fields(self) if item.init}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _one_at_a_time=threading.Lock())
 
     @cached_property
     def varied(self) -> tuple[tuple[Quantity, Sampler], ...]:
