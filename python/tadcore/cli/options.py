@@ -56,7 +56,7 @@ def read(source: str, changes: list[str] | None) -> Scenario:
 def _refuse_what_is_not_there(source: str) -> None:
     """Say in plain words that there is no such file; what else may be wrong with it, its reader says."""
     try:
-        there = "\0" in source or Path(source).exists() or source in bundled.names()
+        there = "\0" in source or os.path.lexists(source) or source in bundled.names()
     except OSError:
         return
     if not there:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import operator
 import re
-from typing import Any
+from functools import reduce
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
@@ -36,11 +39,20 @@ def plain_signature(model: type[BaseModel]) -> inspect.Signature:
             name,
             inspect.Parameter.KEYWORD_ONLY,
             default=inspect.Parameter.empty if field.is_required() else _default(field),
-            annotation=field.annotation,
+            annotation=_plain(field.annotation),
         )
         for name, field in model.model_fields.items()
     ]
     return inspect.Signature(parameters, return_annotation=None)
+
+
+def _plain(kind: Any) -> Any:
+    """A type without what pydantic is told of it."""
+    if get_origin(kind) is Annotated:
+        return _plain(get_args(kind)[0])
+    if get_origin(kind) in (Union, UnionType):
+        return reduce(operator.or_, map(_plain, get_args(kind)))
+    return kind
 
 
 class _ByTheGame:
@@ -55,5 +67,5 @@ def _default(field: Any) -> Any:
 
 
 def _words(field: Any) -> str:
-    kind = re.sub(r"\b(tadcore\.scenario\.\w+|typing)\.", "", inspect.formatannotation(field.annotation))
+    kind = re.sub(r"\b(tadcore\.scenario\.\w+|typing)\.", "", inspect.formatannotation(_plain(field.annotation)))
     return kind if field.is_required() else f"{kind}, default {_default(field)!r}"

@@ -147,6 +147,7 @@ class Result:
     scenario: tadcore.Scenario
     inputs: dict[str, np.ndarray] = field(default_factory=dict)
     trials: int = 20
+    seed: int = 0
 
 
 def test_a_study_brings_its_own_starts(sc):

@@ -26,7 +26,7 @@ def test_an_escape_says_when_and_what_would_be_short_enough():
     assert error.escape_instant == 6.0 - 0.11905084462320856
     assert error.longest_horizon == 0.115
     assert "no feedback Nash equilibrium on [0, 6]" in str(error)
-    assert "0.11905084462320856" in str(error)
+    assert "finite only from t = 5.88095 on, 0.119051 before the horizon" in str(error)
     assert "0.115" in str(error)
     assert "not even one step of 0.005 is short enough" in str(NoEquilibriumError(0.001, 6.0, 0.005))
 
@@ -93,8 +93,8 @@ def test_faults_of_memory_stores_and_workers_say_what_to_do_and_travel(error, te
 @pytest.mark.parametrize(
     "call", [tadcore.simulate, tadcore.solve_equilibrium, lambda sc: tadcore.simulate_batch(sc, [])]
 )
-def test_a_file_name_is_no_scenario(call):
+def test_a_name_that_no_file_has_is_no_scenario(call):
     with pytest.raises(
-        tadcore.ScenarioError, match=r"scenario: got 'my\.toml', must be a Scenario: Scenario\.from_toml"
+        tadcore.ScenarioError, match=r"scenario: got 'my\.toml', must be a file, or the name of a bundled scenario"
     ):
         call("my.toml")

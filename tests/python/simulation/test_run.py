@@ -43,7 +43,7 @@ def test_the_paper_to_the_digit(run):
 
 def test_the_record_and_the_dataset_are_the_same(run):
     data, sc = run.dataset, run.scenario
-    assert dict(data.sizes) == {"time": 280, "player": 5, "axis": 2, "term": 4, "observer": 3, "entry": 4}
+    assert dict(data.sizes) == {"time": 280, "player": 5, "axis": 2, "term": 4, "observer": 3, "entry": 4, "seen": 5}
     assert list(data.player.values) == ["d1", "d2", "d3", "target", "attacker"]
     assert np.array_equal(data.position.sel(time=0.0), sc.positions)
     assert np.array_equal(data.position.values, run.position)

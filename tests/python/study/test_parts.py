@@ -224,4 +224,4 @@ def test_workers_read_the_saved_table(tmp_path):
 def test_outcomes_and_their_counts_are_of_one_chunk(monkeypatch):
     monkeypatch.setattr("tadcore.study.plan.Plan.game", Instant())
     plan = study(CHUNK).plan
-    assert isinstance(plan.play(plan.draw(0), 1), Outcomes)
+    assert isinstance(plan.play(plan.draw(0), 0, 1), Outcomes)

@@ -105,7 +105,7 @@ def test_a_scenario_is_a_name_or_a_table(written):
         ("{ cycle = [0.1, 0.2, 0.3] }", "{}", "a table such as"),
         ("{ cycle = [0.1, 0.2, 0.3] }", "{ cycle = [0.1], values = [0.1] }", "one of the samplers"),
         ("{ cycle = [0.1, 0.2, 0.3] }", '{ callable = "os.system" }', "one of the samplers"),
-        ('"attacker.capture_radius"', '"attacker.control_weight"', "tadcore.sweep"),
+        ('"attacker.capture_radius"', '"interaction"', "tadcore.sweep"),
         ('"attacker.capture_radius"', '"atacker.capture_radius"', "did you mean attacker.capture_radius"),
     ],
 )

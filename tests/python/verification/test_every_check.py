@@ -279,8 +279,8 @@ def test_the_report_reads_and_serialises(run):
 
 
 def test_other_things_are_refused():
-    with pytest.raises(tadcore.ScenarioError, match="a Scenario or a Run"):
-        tadcore.verify("paper-i1")
+    with pytest.raises(tadcore.ScenarioError, match="scenario: got 5, must be a Scenario, the path of a TOML file"):
+        tadcore.verify(5)
 
 
 def test_a_game_that_is_over_at_once(run):

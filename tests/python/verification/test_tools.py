@@ -53,9 +53,9 @@ def test_a_radius_delays_nothing_else(monkeypatch):
         v.radius_delay(sc, "attacker", 0.3, 0.6)
     real = geometry.simulate
 
-    def leaking(scenario):
+    def leaking(scenario, **draws):
         """The radius of d3 shifts the last bit of a control."""
-        run = real(scenario)
+        run = real(scenario, **draws)
         return dataclasses.replace(run, control=run.control * (1.0 + 1e-15 * (scenario.visibility_radii[2] > 0.5)))
 
     monkeypatch.setattr(geometry, "simulate", leaking)
@@ -68,8 +68,8 @@ def test_a_symmetry_that_does_not_hold_is_found(name, monkeypatch):
     assert v.check_geometry(run)[f"geometry.{name}"].ok
     real = geometry.simulate
 
-    def skewed(sc):
-        other = real(sc)
+    def skewed(sc, **draws):
+        other = real(sc, **draws)
         return dataclasses.replace(other, position=other.position * (1.0 + 1e-6))
 
     monkeypatch.setattr(geometry, "simulate", skewed)
@@ -87,8 +87,8 @@ def test_a_game_on_the_rim_cannot_decide_a_symmetry(monkeypatch):
     run = tadcore.simulate(sc)
     real = geometry.simulate
 
-    def flipped(moved):
-        other = real(moved)
+    def flipped(moved, **draws):
+        other = real(moved, **draws)
         return dataclasses.replace(other, outcome=dataclasses.replace(other.outcome, time=0.0))
 
     monkeypatch.setattr(geometry, "simulate", flipped)

@@ -57,10 +57,9 @@ def test_a_diverging_game_is_undecided():
     assert all(math.isfinite(measured.value) for measured in report.measurements)
 
 
-def test_a_fault_in_a_stiff_game_is_not_hidden():
+def test_a_fault_in_an_undecided_game_is_not_hidden():
     """What does not read P(t) decides, whether or not P(t) can be followed."""
-    sc = tadcore.scenarios.load("paper-i1").replace({"attacker.control_weight": 1e-12, "horizon": 1e-6, "step": 1e-8})
-    run = tadcore.simulate(sc)
+    run = tadcore.simulate(tadcore.scenarios.load("paper-i2").replace({"attacker.control_weight": 0.3}))
     late = run.times.copy()
     late[3] += 1e-9
     report = tadcore.verify(dataclasses.replace(run, times=late))
@@ -104,7 +103,7 @@ def test_exit_codes(tmp_path, capsys):
     assert "could not be decided" in said.err
     data = json.loads(out.read_text(encoding="utf-8"))
     assert data["status"] == "undecided"
-    assert {check["status"] for check in data["checks"]} == {"passed", "undecided"}
+    assert {check["status"] for check in data["checks"]} == {"undecided"}
     with pytest.raises(SystemExit) as left:
         cli.main(["verify", "--help"])
     assert left.value.code == 0

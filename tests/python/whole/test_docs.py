@@ -52,7 +52,7 @@ def test_the_code_of_a_page_runs(page, monkeypatch, tmp_path):
     printed = run_cells(page, monkeypatch, tmp_path)
     if page.stem == "errors":
         said = {line.partition(":")[0] for line in printed.splitlines()}
-        wanted = {"ScenarioError", "NoEquilibriumError", "StoreError", "WorkerError", "VerificationError", "ValueError"}
+        wanted = {"ScenarioError", "NoEquilibriumError", "StoreError", "WorkerError", "VerificationError"}
         assert wanted <= said
     if page.stem == "paper":
         assert re.search(r"paper-i2-full +time +3\.455 +3\.275", printed)

@@ -34,7 +34,7 @@ def a_map():
 
 def by_verify(path):
     with pytest.raises(SystemExit):
-        main(["verify", "paper-i1", "--set", "horizon=0.1", "--deviations", "0", "--json", str(path)])
+        main(["verify", "paper-i1", "--set", "horizon=0.1", "--deviations", "0", "--out", str(path)])
 
 
 WRITERS = {
@@ -105,7 +105,7 @@ def test_a_report_goes_to_standard_output_before_what_is_printed(tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "tadcore", "verify", "paper-i1", "--set", "horizon=0.1", "--deviations", "0"]
     with out.open("w") as stream:
-        subprocess.run([*command, "--json", "/dev/stdout"], stdout=stream, stderr=subprocess.PIPE)
+        subprocess.run([*command, "--out", "/dev/stdout"], stdout=stream, stderr=subprocess.PIPE)
     said, end = json.JSONDecoder().raw_decode(out.read_text(encoding="utf-8"))
     assert said["checks"]
     assert out.read_text(encoding="utf-8")[end:].strip()  # the lines that a reader is shown

@@ -63,7 +63,8 @@ class Scene:
             _set(mover["recent"], path[since:])
             _set(mover["marker"], path[-1:])
             blind = self._is_blind(p, k)
-            _set(mover["failure"], path[-1:] if blind else path[:0])
+            if "failure" in mover:
+                _set(mover["failure"], path[-1:] if blind else path[:0])
             if "sight" in mover:
                 self._look_around(mover, path[-1], 0.0 if blind else float(self._radii[player]))
             name = mover["name"]
@@ -169,16 +170,12 @@ class Scene:
             *nothing.T, linestyle="none", color=it.colour, marker=it.marker, markersize=size,
             markeredgecolor="white", markeredgewidth=0.7, zorder=3.2,
         )  # fmt: skip
-        (failure,) = self._arena.plot(
-            *nothing.T,
-            linestyle="none",
-            color="black",
-            marker="x",
-            markersize=1.6 * size,
-            markeredgewidth=1.4,
-            zorder=3.3,
-        )
-        mover: dict[str, Any] = {"trail": trail, "recent": recent, "marker": marker, "failure": failure}
+        mover: dict[str, Any] = {"trail": trail, "recent": recent, "marker": marker}
+        if self._run.course is not None and not self._run.course.sensor_up.all():
+            (mover["failure"],) = self._arena.plot(
+                *nothing.T, linestyle="none", color="black", marker="x", markersize=1.6 * size, markeredgewidth=1.4,
+                zorder=3.3,
+            )  # fmt: skip
         if np.isfinite(self._radii.get(player, np.inf)):
             (mover["sight"],) = self._arena.plot(
                 *nothing.T, color=it.colour, linestyle=it.dashes, linewidth=0.8, alpha=0.7, zorder=1.5, scalex=False,

@@ -58,7 +58,8 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
         colour = look(edge[0]).colour
         solid, hollow = ([(a, b - a) for a, b in bars.get(edge, [])] for bars in (seen, told))
         ax.broken_barh(solid, (row - 0.36, 0.72), color=colour, linewidth=0, zorder=2.0)
-        ax.broken_barh(hollow, (row - 0.24, 0.48), facecolor="white", edgecolor=colour, linewidth=0.8, zorder=1.9)
+        if hollow:
+            ax.broken_barh(hollow, (row - 0.24, 0.48), facecolor="white", edgecolor=colour, linewidth=0.8, zorder=1.9)
         ax.axhline(row, color=colour, linewidth=0.4, alpha=0.5, zorder=1.0)
     failed = _shade_failures(ax, run, rows)
     for row in range(1, len(rows)):
