@@ -110,7 +110,7 @@ MUTANTS = {
         ("batches: trial of a copy", "[«from % BLOCK»]", "to % BLOCK"),
         ("batches: block of a copy", "numbers[«from / BLOCK * step + e»]", "to / BLOCK * step + e"),
     ],
-    "ensemble/sweep.rs": [
+    "ensemble/eight.rs": [
         (
             "batches: ‖z_i‖",
             "let a = V::Eight::load(&z[i * D + x]);\n        sum = «sum + a * a»;",
@@ -131,6 +131,8 @@ MUTANTS = {
             "«V::Eight::load(&z[i * D + x]) - V::Eight::load(&z[j * D + x])»",
             "V::Eight::load(&z[i * D + x]) + V::Eight::load(&z[j * D + x])",
         ),
+    ],
+    "ensemble/sweep.rs": [
         ("batches: whose capture radius", "V::Eight::load(&capture[«I»])", "N - 1 - I"),
         ("batches: bit of the attacker", "1 << («I * N + I»)", "I * N"),
         ("batches: bit of a player before", "1 << («I * N + J»)", "J * N + I"),

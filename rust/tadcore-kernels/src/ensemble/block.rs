@@ -11,27 +11,10 @@
 //! A [`Sweep`] moves blocks; [`super::sweep`] has it compiled for the sizes that matter, [`super::anysize`] for all
 //! others.
 
+pub use super::eight::{BLOCK, PerTrial, Shape};
 use super::network::Network;
 use crate::policy::step_table::StepTable;
 use crate::simd::Width;
-
-/// Trials side by side.
-pub const BLOCK: usize = 8;
-/// One number of each of them.
-pub type PerTrial = [f64; BLOCK];
-
-/// Sizes of a game, for code that is not compiled for them.
-#[derive(Debug, Clone, Copy)]
-pub struct Shape {
-    /// N.
-    pub size: usize,
-    /// m.
-    pub rows: usize,
-    /// Axes.
-    pub dim: usize,
-    /// Words of a key.
-    pub words: usize,
-}
 
 /// The trials of a chunk, block after block.
 pub struct Blocks {

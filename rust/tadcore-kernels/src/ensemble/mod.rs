@@ -2,5 +2,6 @@
 
 pub mod anysize;
 pub mod block;
+pub mod eight;
 pub mod network;
 pub mod sweep;

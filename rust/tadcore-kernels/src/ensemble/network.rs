@@ -2,15 +2,14 @@
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
-//! | mask | [`Network::up`] | which edges are up, a bit each, as in [`Keys`](super::block::Keys) |
+//! | mask | [`Network::up`] | which edges are up, a bit each, as in a block's keys |
 //! | L | [`Relay::up`], [`Relay::new`] | bit i·m + j: i hears j, if the link is up and they are near enough |
 //! | relay | [`Rule`] | who is told what, from what is seen and who hears whom |
 //!
 //! What small teams are told is looked up, by a table that fills as it is asked. In larger ones, what a trial was told
 //! last is kept beside what it was told from, and asked for anew only where that differs.
 
-use super::block::{BLOCK, PerTrial, Shape};
-use super::sweep::distance;
+use super::eight::{BLOCK, PerTrial, Shape, distance};
 use crate::simd::{Number, Simd, Width, dispatch};
 
 /// One word of each trial.

@@ -9,6 +9,7 @@
 
 use super::anysize::sweep_any;
 use super::block::{BLOCK, Blocks, Keys, PerTrial, Shape, Stop, Sweep, playing};
+use super::eight::{distance, norm};
 use crate::policy::index::DIRECT_BITS;
 use crate::policy::step_table::StepTable;
 use crate::simd::{Number, Simd, Width, dispatch};
@@ -37,30 +38,6 @@ macro_rules! unrolled {
 }
 
 // No closures below: they are functions of their own, and the compiler would not inline the wide instructions into them.
-
-/// ‖z_i‖² of eight trials, the axes added in order.
-#[inline(always)]
-fn norm<V: Simd, const D: usize>(z: &[PerTrial], i: usize) -> V::Eight {
-    let first = V::Eight::load(&z[i * D]);
-    let mut sum = first * first;
-    for x in 1..D {
-        let a = V::Eight::load(&z[i * D + x]);
-        sum = sum + a * a;
-    }
-    sum
-}
-
-/// ‖z_i − z_j‖² of eight trials.
-#[inline(always)]
-pub fn distance<V: Simd, const D: usize>(z: &[PerTrial], i: usize, j: usize) -> V::Eight {
-    let first = V::Eight::load(&z[i * D]) - V::Eight::load(&z[j * D]);
-    let mut sum = first * first;
-    for x in 1..D {
-        let a = V::Eight::load(&z[i * D + x]) - V::Eight::load(&z[j * D + x]);
-        sum = sum + a * a;
-    }
-    sum
-}
 
 /// The keys of one block, and a bit for each trial in which somebody is caught or far off.
 #[inline(always)]

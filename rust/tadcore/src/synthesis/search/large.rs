@@ -23,7 +23,7 @@ use crate::synthesis::newton::{
     Backend, Layout, Limits, Objective, Owner, Reached, Tasks, Variable, Workspace, factorise, forward, minimise,
     packed,
 };
-use crate::synthesis::theta::{Problem, Scratch, TABULATED_UP_TO, Tabled, TabledCertificate, TabledParts};
+use crate::synthesis::theta::{Problem, Scratch, Tabled, TabledCertificate, TabledParts};
 
 /// Restarts of all rows made in one round.
 pub(super) const RESTARTS: usize = 24;
@@ -48,11 +48,6 @@ const CERTIFICATE_ROUNDING: f64 = 1e-12;
 const CERTIFICATE_LEAVES: (f64, f64) = (1e-10, 1e-15);
 /// What asks for memory here.
 const WHAT: &str = "the restarts in a large game";
-
-/// Whether a game is large.
-pub(super) fn is_large(problem: &Problem) -> bool {
-    problem.size > TABULATED_UP_TO
-}
 
 widened! {
     /// Makes the listed descents of one network.

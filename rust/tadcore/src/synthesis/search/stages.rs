@@ -2,7 +2,6 @@
 
 use super::candidate::{BACK, Candidate, Start};
 use super::dispatch::{self, Dispatcher, Kind};
-use super::large;
 use super::moves::Moves;
 use crate::error::{NoMemory, Stopped};
 use crate::memory;
@@ -61,7 +60,7 @@ impl Search<'_> {
         self.limits.iterations = 0;
         self.first(Kind::Real, candidates, true)?;
         self.limits = limits;
-        if large::is_large(self.problem) {
+        if self.problem.is_large() {
             for candidate in candidates.iter_mut().filter(|candidate| !candidate.complete) {
                 self.run_large(candidate)?;
             }

@@ -40,7 +40,7 @@ fn alone(problem: &Problem, topology: &Topology, complex: bool) -> f64 {
 }
 
 #[test]
-fn the_look_that_won_is_the_one_that_leads_there() {
+fn the_start_that_won_is_the_one_that_leads_there() {
     let mut won = [0, 0];
     let (problem, _, _) = sample(Interaction::I2);
     let (m, n) = (problem.rows(), problem.size());

@@ -181,6 +181,11 @@ impl Problem {
         self.theta.double.coupling.is_empty()
     }
 
+    /// Whether the game is large: past tables of every product, with a search of its own.
+    pub(crate) fn is_large(&self) -> bool {
+        self.size > TABULATED_UP_TO
+    }
+
     /// N.
     #[must_use]
     pub fn size(&self) -> usize {
