@@ -19,7 +19,7 @@ LISTED := $(BIN)/python -c 'import sys, tomllib; p = tomllib.load(open("pyprojec
   print(*p["dependencies"], *(x for e in sys.argv[1:] for x in p["optional-dependencies"][e]), sep="\n")'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup develop installed demo test test-rust test-python lowest heavy faults fuzz sanitize mutants audit lint format \
+.PHONY: help setup develop installed demo test test-rust test-python test-games test-rest lowest heavy faults fuzz sanitize mutants audit lint format \
         bench peers images docs wheel sdist check clean
 
 help:  ## list the targets
@@ -69,9 +69,17 @@ test: test-rust test-python  ## run every test, Rust and Python
 test-rust:
 	cargo test --release --locked --package tadcore --package tadcore-kernels --package tadcore-python
 
+# Two halves side by side, of about the same length.
+GAMES := $(addprefix tests/python/,study simulation verification analysis report)
 test-python: setup
-	$(BIN)/python -m pytest
+	@$(MAKE) --silent --jobs=2 test-games test-rest
 	$(BIN)/python -m mypy.stubtest tadcore._core
+
+test-games:
+	$(BIN)/python -m pytest -q -p no:cacheprovider $(GAMES)
+
+test-rest:
+	$(BIN)/python -m pytest -q -p no:cacheprovider tests/python $(addprefix --ignore=,$(GAMES))
 
 # The compiled core is the one of this checkout. Old wheels are made for old Pythons: 3.11 where there is one.
 LOWEST        := .venv-lowest

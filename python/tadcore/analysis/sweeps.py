@@ -137,12 +137,15 @@ class SweepResult:
             },
             attrs={**provenance(self.study.scenario), "seed": str(self.study.seed), "design": self.study.design},
         )
+        # The same values under the name that people write, and under one that Python takes for a keyword.
+        again: dict[str, str] = {}
         for path in self.grid:
-            if short(path) != path:  # the same values under the name that people write
-                made = made.assign_coords({short(path): (path, made[path].values)}).set_xindex(short(path))
-            keyword = re.sub(r"\W+", "_", short(path))
-            if keyword not in made.coords:  # the same again as a name that Python takes for a keyword
-                made = made.assign_coords({keyword: (path, made[path].values)}).set_xindex(keyword)
+            for name in (short(path), re.sub(r"\W+", "_", short(path))):
+                if name not in made.coords and name not in again:
+                    again[name] = path
+        made = made.assign_coords({name: (path, made[path].values) for name, path in again.items()})
+        for name in again:
+            made = made.set_xindex(name)
         return made
 
     def _repr_html_(self) -> str:

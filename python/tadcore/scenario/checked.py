@@ -88,7 +88,7 @@ class CheckedModel(BaseModel, metaclass=_CheckedMeta):
         """A field that is None is one that is left out."""
         return ((name, value) for name, value in super().__repr_args__() if value is not None)
 
-    @model_serializer(mode="wrap")
+    @model_serializer(mode="wrap", return_type=dict[str, Any])  # pydantic 2.10 would look for Any where a model is made
     def _written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What is left out is not written."""
         return {name: value for name, value in handler(self).items() if value is not None}

@@ -215,7 +215,7 @@ class Scenario(CheckedModel):
     def _repr_html_(self) -> str:
         return html_of(self)
 
-    @model_serializer(mode="wrap")
+    @model_serializer(mode="wrap", return_type=dict[str, Any])  # pydantic 2.10 would look for Any where a model is made
     def _written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What is written can be read: fields of the other interaction are left out."""
         data = {name: value for name, value in handler(self).items() if value is not None}
