@@ -55,14 +55,16 @@ def read(source: str, changes: list[str] | None) -> Scenario:
 
 def _refuse_what_is_not_there(source: str) -> None:
     """Say in plain words that there is no such file; what else may be wrong with it, its reader says."""
-    try:
-        there = "\0" in source or os.path.lexists(source) or source in bundled.names()
-    except OSError:
+    if "\0" in source or source in bundled.names():
         return
-    if not there:
+    try:
+        os.lstat(source)
+    except FileNotFoundError:
         hint = similar(source, bundled.names(), cutoff=0.5)
         words = f"there is no such file, and no bundled scenario of that name{hint and f'; {hint}'}"
-        raise FileNotFoundError(errno.ENOENT, words, source)
+        raise FileNotFoundError(errno.ENOENT, words, source) from None
+    except OSError:
+        return
 
 
 def usable(out: Path | None) -> None:
