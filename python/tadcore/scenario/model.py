@@ -84,7 +84,9 @@ class Scenario(CheckedModel):
     feedback: Literal["finite", "receding"] | None = Field(
         default=None, description='"finite": P(t) up to T (the default); "receding": P of one prediction horizon'
     )
-    prediction_horizon: Positive | None = Field(default=None, description="T_h, how far ahead P looks (receding only)")
+    prediction_horizon: Positive | None = Field(
+        default=None, description="T_h, the horizon over which P is solved (receding only)"
+    )
     criterion: Literal["paper", "component"] | None = Field(
         default=None,
         description='"paper": Θ over all rows (the default); "component": who knows all plays its equilibrium row',

@@ -39,7 +39,7 @@ def _of_the_grid(sc: Shape) -> list[Problem]:
 def _of_the_feedback(sc: Shape) -> list[Problem]:
     receding, ahead = sc.feedback == "receding", sc.prediction_horizon
     if receding and ahead is None:
-        return [(("prediction_horizon",), MISSING, "given: T_h, how far ahead P looks under a receding horizon")]
+        return [(("prediction_horizon",), MISSING, "given: T_h, the horizon over which P is solved")]
     if ahead is not None and not receding:
         return [(("prediction_horizon",), ahead, 'left out: feedback is not "receding"')]
     if sc.criterion == "component" and len(sc.constrained) == 1:

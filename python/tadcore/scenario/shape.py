@@ -31,7 +31,7 @@ class Shape(Protocol):
 
     @property
     def feedback(self) -> Literal["finite", "receding"] | None:
-        """Up to which end P looks."""
+        """The horizon over which P is solved."""
 
     @property
     def prediction_horizon(self) -> float | None:

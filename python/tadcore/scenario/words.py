@@ -21,7 +21,7 @@ def describe(sc: Shape) -> str:
     if sc.interaction == "I1":
         lines[0] += f" (λ = {sc.attacker.evasion:g})"
     if sc.feedback == "receding":
-        lines.append(f"receding horizon: P looks T_h = {sc.prediction_horizon:g} ahead throughout")
+        lines.append(f"receding horizon: P is that at the beginning of T_h = {sc.prediction_horizon:g} throughout")
     if sc.criterion == "component":
         lines.append("team criterion: whoever knows everything plays its row of the equilibrium")
     gamma = sc.synthesis_weights

@@ -8,7 +8,6 @@ import sys
 
 import pytest
 
-pytest.importorskip("tadcore._core")
 ROOM = 2.0
 CHILD = """
 import os, signal, sys, threading, time

@@ -117,8 +117,7 @@ def test_a_game_without_equilibrium_leaves_with_1(tadcore, monkeypatch):
     def escape(sc, **_options):
         raise NoEquilibriumError(0.119, sc.horizon, sc.step)
 
-    module = pytest.importorskip("tadcore.simulation.play")
-    monkeypatch.setattr(module, "simulate", escape)
+    monkeypatch.setattr("tadcore.simulation.play.simulate", escape)
     code, out, err = tadcore("simulate", "paper-i1")
     assert (code, out) == (1, "")
     assert err.startswith("error: the game has no feedback Nash equilibrium on [0, 6]")

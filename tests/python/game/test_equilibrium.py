@@ -6,8 +6,6 @@ import pytest
 import tadcore
 from tadcore import NoEquilibriumError, ScenarioError
 
-pytest.importorskip("tadcore._core")
-
 
 @pytest.fixture(scope="module", params=["paper-i1", "paper-i2"])
 def solved(request):

@@ -14,8 +14,6 @@ from hypothesis import given, settings, strategies as st
 import tadcore
 from tadcore import ScenarioError, VisibilityNetwork
 
-pytest.importorskip("tadcore._core")
-
 TRIPLES = [(3, 4, 0, 5), (5, 12, 0, 13), (8, 15, 0, 17), (20, 21, 0, 29), (1, 2, 2, 3), (2, 3, 6, 7), (4, 4, 7, 9)]
 
 

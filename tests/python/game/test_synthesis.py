@@ -6,8 +6,6 @@ import pytest
 import tadcore
 from tadcore import ScenarioError, VisibilityNetwork
 
-pytest.importorskip("tadcore._core")
-
 
 @pytest.fixture(params=["paper-i1", "paper-i2"])
 def sc(request):

@@ -5,8 +5,6 @@ import pytest
 
 import tadcore
 
-pytest.importorskip("tadcore._core")
-
 WITHOUT = {"paper-i1": [(1.0, 0.0, 0.0, 0.0), (0.5, 0.2, 0.3, 0.0)], "paper-i2": [(0.5, 0.0, 0.5), (0.5, 0.5, 0.0)]}
 
 

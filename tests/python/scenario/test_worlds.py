@@ -258,7 +258,7 @@ def test_a_description_says_what_surrounds_the_game():
 def test_feedback_and_criterion():
     sc = I1.replace({"feedback": "receding", "prediction_horizon": 2.0, "criterion": "component"})
     assert Scenario.from_toml_string(sc.to_toml()) == sc
-    assert "receding horizon: P looks T_h = 2 ahead throughout" in sc.describe()
+    assert "receding horizon: P is that at the beginning of T_h = 2 throughout" in sc.describe()
     assert "team criterion: whoever knows everything plays its row of the equilibrium" in sc.describe()
     assert not {"feedback", "prediction_horizon", "criterion"} & tomllib.loads(I1.to_toml()).keys()
     assert sc.replace({"feedback": None, "prediction_horizon": None, "criterion": None}).to_toml() == I1.to_toml()

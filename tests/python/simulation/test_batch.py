@@ -8,8 +8,6 @@ import pytest
 import tadcore
 from tadcore import Outcome, OutcomeKind, ScenarioError
 
-pytest.importorskip("tadcore._core")
-
 
 @pytest.fixture
 def sc():

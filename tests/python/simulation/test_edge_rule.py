@@ -12,7 +12,6 @@ from oracle.network import number
 from oracle.scenario import as_mapping
 from oracle.stepping import Gains, Remembering, simulate
 
-pytest.importorskip("tadcore._core")
 GAME = uniform("I1", (1, 1, 1), 1.2, 0.8, horizon=6.0, step=0.04)
 CHATTERS = np.array([[1.9, -2.98], [2.14, -2.8], [1.38, -1.95], [2.18, 0.25], [-1.2, -0.46]])
 START = Start(CHATTERS, np.array([5.0, 2.25, 1.25]), np.full(4, 0.1))

@@ -7,7 +7,6 @@ import sys
 
 import pytest
 
-pytest.importorskip("tadcore._core")
 CODE = """
 import os, signal, sys, threading, time
 import numpy as np

@@ -10,7 +10,6 @@ import time
 
 import pytest
 
-pytest.importorskip("tadcore._core")
 ROOM = 2.0
 CHILD = """
 import signal, sys, time

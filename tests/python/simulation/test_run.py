@@ -10,8 +10,6 @@ import xarray as xr
 import tadcore
 from tadcore import Outcome, Scenario, VisibilityNetwork
 
-pytest.importorskip("tadcore._core")
-
 
 @pytest.fixture(scope="module")
 def run():

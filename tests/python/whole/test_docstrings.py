@@ -5,8 +5,6 @@ import importlib
 
 import pytest
 
-pytest.importorskip("tadcore._core")
-
 MODULES = ["", ".scenario.model", ".scenarios", ".game.equilibrium", ".game.network", ".game.synthesis"]
 MODULES += [
     ".simulation.play",

@@ -7,8 +7,6 @@ import pytest
 
 from widths import python, widths
 
-pytest.importorskip("tadcore._core")
-
 SCRIPT = Path(__file__).parents[2] / "reference" / "golden.py"
 
 

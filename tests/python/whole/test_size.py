@@ -19,8 +19,6 @@ import pytest
 import tadcore
 from tadcore import OutOfMemoryError, ScenarioError
 
-pytest.importorskip("tadcore._core")
-
 
 def crowd(n, zeta=math.inf, interaction="I1", horizon=0.05, step=0.005, seed=0):
     """n defenders at random on a square on which each has about one neighbour within 0.56."""

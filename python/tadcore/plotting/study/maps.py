@@ -126,12 +126,12 @@ def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: Extent) ->
     code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
     if "diverged" in found.dataset:
         code = np.where(found.dataset["diverged"].values, len(names) - 1, code)
-    looks = [outcome_look(name) for name in names]
-    colours = np.array([look.fill for look in looks])
+    styles = [outcome_look(name) for name in names]
+    colours = np.array([style.fill for style in styles])
     ax.imshow(colours[code], origin="lower", extent=extent, interpolation="nearest", zorder=1.0)
     there = [i for i in range(len(names)) if np.any(code == i)]
     for i in there:
-        _hatch(ax, x, y, code == i, looks[i].hatch)
+        _hatch(ax, x, y, code == i, styles[i].hatch)
     return [names[i] for i in there]
 
 
