@@ -84,9 +84,10 @@ def exact_costs(run):
 def modal_costs(run):
     """J by group and, by group, how far rounding may move it; for any number of defenders."""
     sc = run.scenario
-    delta = sc.horizon / sc.steps
     total, doubt = dict.fromkeys(objectives(sc), 0.0), dict.fromkeys(objectives(sc), 0.0)
     for k, rows in enumerate(players(run)[:-1]):
+        # a game that ends at a crossing ends within its last step
+        delta = min(sc.horizon / sc.steps, run.times[k + 1] - run.times[k])
         C = rows[:-1] - rows[-1]
         modes, V = np.linalg.eig(C)
         z = run.position[k, :-1] - run.position[k, -1]

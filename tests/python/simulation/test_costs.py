@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 import tadcore
 from oracle.stiff import exact_costs, modal_costs
@@ -59,16 +59,8 @@ def test_a_stiff_run_writes_numbers(tmp_path):
 weights = st.floats(-10.0, 4.0).map(lambda x: 10.0**x)
 
 
-@settings(max_examples=100)
-@given(
-    st.sampled_from(["I1", "I2"]),
-    st.lists(weights, min_size=3, max_size=6),
-    st.integers(1, 4),
-    st.floats(-4.0, 1.0).map(lambda x: 10.0**x),
-    st.sampled_from([0.0, 0.5, 1.0]),
-    st.integers(0, 2**32 - 1),
-)
-def test_costs_of_any_weights_are_sums_over_modes(interaction, r, steps, horizon, evasion, seed):
+def team_game(interaction, r, steps, horizon, evasion, seed):
+    """Defenders drawn from a seed, with the control weights r; the last two are the target's and the attacker's."""
     rng = np.random.default_rng(seed)
     n = len(r) - 2
     sc = duel(interaction, steps=steps, horizon=horizon, evasion=evasion)
@@ -81,13 +73,52 @@ def test_costs_of_any_weights_are_sums_over_modes(interaction, r, steps, horizon
         }
         for weight in r[:n]
     ]
-    sc = sc.replace({"defenders": team, "target.control_weight": r[n], "attacker.control_weight": r[n + 1]})
+    return sc.replace({"defenders": team, "target.control_weight": r[n], "attacker.control_weight": r[n + 1]})
+
+
+EXPLODES = ("I1", [1.0, 1e-8, 1.0, 10**0.0625, 10**1.375])  # d2 flies 1e76 away in one step
+
+
+def compare_with_modes(run):
+    """Compare the costs of a run with sums over modes where those are known; which they are."""
+    expected, doubt = modal_costs(run)
+    known = [name for name in expected if doubt[name] < 1e-6 * abs(expected[name])]
+    for name, value in run.costs.items():
+        assert math.isfinite(value)
+        if name in known:
+            assert abs(value - expected[name]) <= 20.0 * doubt[name] + 1e-12 * abs(expected[name]), name
+    return known
+
+
+@settings(max_examples=100)
+@example(*EXPLODES, 2, 1.0, 0.0, 43318343)
+@given(
+    st.sampled_from(["I1", "I2"]),
+    st.lists(weights, min_size=3, max_size=6),
+    st.integers(1, 4),
+    st.floats(-4.0, 1.0).map(lambda x: 10.0**x),
+    st.sampled_from([0.0, 0.5, 1.0]),
+    st.integers(0, 2**32 - 1),
+)
+def test_costs_of_any_weights_are_sums_over_modes(interaction, r, steps, horizon, evasion, seed):
+    sc = team_game(interaction, r, steps, horizon, evasion, seed)
     try:
         run = tadcore.simulate(sc)
     except TadcoreError:  # no equilibrium, too stiff for one, or beyond the range of doubles: said, not shown
         return
-    expected, doubt = modal_costs(run)
-    for name, value in run.costs.items():
-        assert math.isfinite(value)
-        if doubt[name] < 1e-6 * abs(expected[name]):
-            assert abs(value - expected[name]) <= 20.0 * doubt[name] + 1e-12 * abs(expected[name]), name
+    compare_with_modes(run)
+
+
+@pytest.mark.parametrize(("step", "rows"), [(0.5, 4), (0.52, 2)])
+def test_a_diverged_game_that_ends_within_a_step_costs_what_its_record_does(step, rows):
+    """At 0.52 a velocity leaves the range of a record two steps before the end: no row of it is cut at the crossing."""
+    sc = team_game(*EXPLODES, 4, 4.0 * step, 0.0, 43318343)
+    blind, everyone = np.zeros((3, 4), dtype=bool), np.ones((3, 4), dtype=bool)
+    explodes = np.array([blind[0], [True, False, True, True], blind[0]])
+    networks = [blind, explodes, everyone, everyone]
+    run = tadcore.simulate(sc, network=lambda k, *_: networks[k], termination="continuous")
+    assert run.outcome.kind == "intercepted"
+    assert run.diverged is not None
+    assert len(run.times) == rows
+    assert 2.0 * step < run.outcome.time < 2.1 * step
+    assert compare_with_modes(run) == ["defenders", "target", "attacker"]

@@ -57,8 +57,8 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
         append(WHAT, &mut rows, gains)?;
         append(WHAT, &mut rows, free.target.as_deref().unwrap_or_default())?;
         append(WHAT, &mut rows, &free.attacker)?;
-        // A game that ended at a crossing ends within its last step.
-        let step = if k + 1 == record.steps && record.after > 0.0 { record.after } else { step };
+        // A game that ended at a crossing ends within its last step, which a record that stops before does not hold.
+        let step = if k == record.end && record.after > 0.0 { record.after } else { step };
         let norm = closed_loop::norm(&c, size) * step;
         let pieces = (2.0 * norm).ceil().max(1.0);
         let mut z = relative(record, k, size, dim);
@@ -161,15 +161,27 @@ fn largest(values: &[f64]) -> f64 {
 }
 
 /// Coefficients of z(s h), s in [0, 1]: (C h)^j z / j!.
+///
+/// They end where all terms are below rounding, and those of each row too: the rows of a game that diverges are many
+/// orders of magnitude apart, and one that moves apart from the others has a cost of its own. What is small is judged by
+/// (|C|h)^j |z| / j!, in which nothing cancels, so that no later term can be larger again.
 fn expansion(c: &[f64], z: &[f64], size: usize, dim: usize, h: f64) -> Vec<Vec<f64>> {
     let mut series = vec![z.to_vec()];
+    let mut bound: Vec<f64> = z.chunks_exact(dim).map(largest).collect();
+    let (mut so_far, mut next) = (bound.clone(), vec![0.0; size]);
     for j in 1..=DEGREE {
         let mut term = vec![0.0; z.len()];
         for (row, out) in c.chunks_exact(size).zip(term.chunks_exact_mut(dim)) {
             apply(row, &series[j - 1], dim, out);
         }
         term.iter_mut().for_each(|x| *x *= h / j as f64);
-        let done = largest(&term) <= 1e-18 * largest(z);
+        for (row, out) in c.chunks_exact(size).zip(&mut next) {
+            *out = row.iter().zip(&bound).map(|(c, b)| c.abs() * b).sum::<f64>() * (h / j as f64);
+        }
+        std::mem::swap(&mut bound, &mut next);
+        let row_by_row = bound.iter().zip(&so_far).all(|(b, most)| *b <= 1e-16 * most);
+        let done = row_by_row && largest(&term) <= 1e-18 * largest(z);
+        so_far.iter_mut().zip(&bound).for_each(|(most, b)| *most = most.max(*b));
         series.push(term);
         if done {
             break;
