@@ -8,6 +8,7 @@ import subprocess
 import sys
 import termios
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from scipy import stats
@@ -152,6 +153,18 @@ def test_the_command_keeps_the_table(written, tmp_path):
     assert one.time.tolist() == two.time.tolist()
 
 
+def all_that_is_shown(terminal):
+    shown = b""
+    while True:
+        try:
+            block = os.read(terminal, 4096)
+        except OSError:  # the other end is closed
+            return shown
+        if not block:
+            return shown
+        shown += block
+
+
 def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path):
     place = written(FILE.replace("trials = 300", f"trials = {300 * CHUNK}"))
     ours, theirs = pty.openpty()
@@ -167,21 +180,15 @@ def test_in_a_terminal_a_bar_runs_and_ctrl_c_says_how_to_go_on(written, tmp_path
     ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs) as process:
         os.close(theirs)
-        while process.poll() is None and not list((tmp_path / "out").glob("part-*.parquet")):
-            time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
-        shown = b""
-        while True:
-            try:
-                block = os.read(ours, 4096)
-            except OSError:  # the other end is closed
-                break
-            if not block:
-                break
-            shown += block
-        assert process.wait(20) == 130
+        # A terminal that nobody reads is full after a few lines, and the command waits for it.
+        with ThreadPoolExecutor(1) as reader:
+            shown = reader.submit(all_that_is_shown, ours)
+            while process.poll() is None and not list((tmp_path / "out").glob("part-*.parquet")):
+                time.sleep(0.01)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 130
     os.close(ours)
-    text = shown.decode()
+    text = shown.result().decode()
     assert re.search(
         r"\| [\d.]+k/2\.46M \[\d\d:\d\d, +[\d.]+k/s, intercepted 0\.\d{3} captured 0\.\d{3} timeout 0\.\d{3}]", text
     )
