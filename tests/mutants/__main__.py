@@ -33,7 +33,7 @@ CRATES = {"tadcore": Path("rust/tadcore/src"), "tadcore_kernels": Path("rust/tad
 TESTS = [
     "synthesis",
     "global_minimum",
-    "tadcore_kernels",
+    "kernels",
     "tadcore",
     "paper",
     "ensemble",
@@ -143,10 +143,10 @@ def copy(tree, mutants, lighter):
 
 def build(tree, target, name):
     """The program of the tests of this name."""
-    package = name.replace("_", "-") if name in CRATES else "tadcore"
+    package = "tadcore-kernels" if name == "kernels" else "tadcore"
     command = ["cargo", "test", "--locked", "--profile", "mutants", "-p", package, "--no-run"]
     out = subprocess.run(
-        [*command, *(["--lib"] if name in CRATES else ["--test", name]), "--message-format=json-render-diagnostics"],
+        [*command, *(["--lib"] if name == package else ["--test", name]), "--message-format=json-render-diagnostics"],
         cwd=tree,
         env={**os.environ, "CARGO_TARGET_DIR": str(target)},
         capture_output=True,
@@ -193,7 +193,7 @@ class Programs:
 
     def __init__(self, tree, target, room):
         self.tree, self.target = tree, target
-        own = [(crate, f"{room}::") for crate in CRATES] + [(name, "") for name in TESTS if name == room]
+        own = [(tests, f"{room}::") for tests in ("kernels", "tadcore")] + [(name, "") for name in TESTS if name == room]
         self.order = own + [(name, "") for name in TESTS if name != room]
         self.built, self.limits = {}, {}
 

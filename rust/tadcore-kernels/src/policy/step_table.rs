@@ -14,7 +14,7 @@ use crate::memory::{append, reserve};
 use crate::simd::prefetch;
 
 /// Bytes of a cache line.
-const LINE: usize = 64;
+pub const LINE: usize = 64;
 /// Slots of a direct index in one.
 const DIRECT_LINE: usize = LINE / size_of::<u16>();
 /// Numbers of a matrix in one.
@@ -169,45 +169,5 @@ impl StepTable {
         self.keys.clear();
         self.index.clear();
         self.canonical_forms.clear();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Thousands of entries of each kind of key, each found again with its own matrix, and nothing else found.
-    #[test]
-    fn every_entry_is_found_again() {
-        for (rows, size) in [(3, 4), (4, 4), (4, 5), (8, 8), (8, 9), (12, 13)] {
-            let mut table = StepTable::new(rows, size);
-            let (bits, stride) = (rows * size, size * padded(size));
-            let mask = if bits >= 64 { u64::MAX } else { (1 << bits) - 1 };
-            let key = |i: u64| -> Vec<u64> {
-                let mixed = i.wrapping_mul(0x2545_F491_4F6C_DD1D);
-                let last = if bits % 64 == 0 { u64::MAX } else { (1 << (bits % 64)) - 1 };
-                match bits.div_ceil(64) {
-                    1 => vec![if bits <= 16 { i } else { mixed } & mask],
-                    words => (0..words).map(|w| if w == 0 { i } else { mixed & last }).collect(),
-                }
-            };
-            for i in 0..3000 {
-                assert_eq!(table.find(&key(i)), 0, "{rows} {size} {i}");
-                table.insert(&key(i), Some(&key(i / 2 * 2)), &vec![i as f64; stride]).expect("memory");
-            }
-            assert_eq!(table.len(), 3000);
-            for i in 0..3000 {
-                let slot = table.find(&key(i)) as usize;
-                assert_eq!(slot, i as usize + 1);
-                assert!(table.matrix(slot).iter().all(|&x| x == i as f64));
-                assert_eq!(table.key(slot), key(i));
-                // Two entries each have the first as their canonical form.
-                assert_eq!(table.find_canonical(&key(i)), if i % 2 == 0 { i as u32 + 1 } else { 0 });
-            }
-            assert_eq!(table.matrices().as_ptr().align_offset(LINE), 0);
-            assert_eq!(table.find(&key(3000)), 0);
-            table.clear();
-            assert_eq!((table.find(&key(5)), table.find_canonical(&key(4)), table.len()), (0, 0, 0));
-        }
     }
 }

@@ -39,6 +39,3 @@ pub use width::Width;
 pub use width::in_use;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};
-
-#[cfg(test)]
-mod tests;

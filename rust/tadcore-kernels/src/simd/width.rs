@@ -10,8 +10,6 @@ use crate::error::SimdError;
 
 /// The variable that chooses.
 const VARIABLE: &str = "TADCORE_SIMD";
-/// What it may say, the narrowest first.
-const NAMES: [&str; 3] = ["baseline", "avx2", "avx512"];
 
 /// The name of the width in use: the widest that this processor has, or the one that `TADCORE_SIMD` chose.
 ///
@@ -35,6 +33,9 @@ pub enum Width {
 }
 
 impl Width {
+    /// What the environment variable may say, the narrowest first.
+    pub const NAMES: [&str; 3] = ["baseline", "avx2", "avx512"];
+
     /// The width in use.
     pub fn chosen() -> Result<Self, SimdError> {
         static CHOSEN: OnceLock<Result<Width, SimdError>> = OnceLock::new();
@@ -51,7 +52,10 @@ impl Width {
     }
 
     /// What the variable asks for; the widest if it asks for nothing.
-    fn choose(wanted: Option<String>) -> Result<Self, SimdError> {
+    ///
+    /// # Errors
+    /// [`SimdError`] when it is no width, or one that this processor does not have.
+    pub fn choose(wanted: Option<String>) -> Result<Self, SimdError> {
         let all = Self::all();
         let Some(value) = wanted.filter(|value| !value.is_empty()) else {
             return Ok(all.last().copied().unwrap_or(Self::Baseline));
@@ -59,22 +63,22 @@ impl Width {
         let found = all.iter().copied().find(|width| width.name() == value);
         found.ok_or_else(|| {
             let available = all.into_iter().map(Self::name).collect();
-            if NAMES.contains(&value.as_str()) {
+            if Self::NAMES.contains(&value.as_str()) {
                 SimdError::Absent { value, available }
             } else {
-                SimdError::Unknown { value, allowed: &NAMES, available }
+                SimdError::Unknown { value, allowed: &Self::NAMES, available }
             }
         })
     }
 
     /// Its name in the environment variable.
-    fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Baseline => NAMES[0],
+            Self::Baseline => Self::NAMES[0],
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => NAMES[1],
+            Self::Avx2 => Self::NAMES[1],
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => NAMES[2],
+            Self::Avx512 => Self::NAMES[2],
         }
     }
 
@@ -103,42 +107,5 @@ impl Width {
                     && std::arch::is_x86_feature_detected!("avx512vl")
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_variable_chooses_among_the_widths_of_the_processor() {
-        let all = Width::all();
-        assert_eq!(all[0], Width::Baseline);
-        for unset in [None, Some(String::new())] {
-            assert_eq!(Width::choose(unset), Ok(all[all.len() - 1]));
-        }
-        let available: Vec<_> = all.iter().map(|width| width.name()).collect();
-        for name in NAMES {
-            let found = Width::choose(Some(name.to_owned()));
-            match all.iter().find(|width| width.name() == name) {
-                Some(&width) => assert_eq!(found, Ok(width)),
-                None => {
-                    let (value, available) = (name.to_owned(), available.clone());
-                    assert_eq!(found, Err(SimdError::Absent { value, available }));
-                }
-            }
-        }
-        for name in ["AVX2", "avx", "sse2", "avx2 ", "0"] {
-            let error = Width::choose(Some(name.to_owned())).expect_err("no width");
-            let allowed = "it must be baseline, avx2 or avx512 (or empty: the widest); this processor has baseline";
-            assert!(error.to_string().starts_with(&format!("TADCORE_SIMD is {name:?}, but {allowed}")), "{error}");
-        }
-    }
-
-    #[test]
-    fn a_width_that_the_processor_lacks_is_named_with_those_it_has() {
-        let error = SimdError::Absent { value: "avx512".to_owned(), available: vec!["baseline", "avx2"] };
-        let said = "TADCORE_SIMD is \"avx512\", but this processor has only baseline, avx2";
-        assert_eq!(error.to_string(), said);
     }
 }

@@ -22,9 +22,9 @@ mod tile;
 mod variables;
 mod workspace;
 
-pub use factor::{Backend, back, factorise, forward};
+pub use factor::{BLOCK, BLOCKED_SIZE, Backend, LIBRARY_SIZE, back, factorise, forward};
 pub use layout::packed;
-pub use layout::{Form, Layout, Slot};
+pub use layout::{Form, GROUP, Layout, Slot};
 pub use minimise::{minimise, unknowns};
 pub use objective::Objective;
 pub use tasks::Status;

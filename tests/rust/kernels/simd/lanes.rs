@@ -1,6 +1,7 @@
 //! Each operation, lane by lane, against the same one on numbers by themselves.
 
-use super::*;
+use tadcore_kernels::dispatch;
+use tadcore_kernels::simd::{Number, Scalar, Simd, Width, dot, dot_in_order, norm, take};
 
 /// Pairs of them are in any order, equal, of both signs, zero, and no numbers; all are numbers of single precision.
 const NUMBERS: [f64; 11] =
