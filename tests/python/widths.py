@@ -5,12 +5,13 @@ import subprocess
 import sys
 
 
-def python(code, simd):
+def python(code, simd, *arguments):
     """A fresh interpreter in which the variable says this, or is not there."""
     environment = {name: value for name, value in os.environ.items() if name != "TADCORE_SIMD"}
     if simd is not None:
         environment["TADCORE_SIMD"] = simd
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 
 def widths():
