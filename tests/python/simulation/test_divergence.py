@@ -45,7 +45,7 @@ def scaled(sc, factor):
     return sc.replace(radii | places)
 
 
-@pytest.mark.parametrize("weight", [0.3, 0.31])
+@pytest.mark.parametrize("weight", [0.3, pytest.param(0.31, marks=pytest.mark.heavy)])
 def test_the_instant_is_that_of_another_solver_and_scipys_exponentials(weight):
     sc = unstable(weight)
     run = tadcore.simulate(sc)

@@ -78,7 +78,7 @@ rng = np.random.default_rng(3)
 zeta = 0.7 * n**0.5 if what != "equilibrium" else float("inf")
 second = what.endswith("I2")
 defender = {"control_weight": 1.0, "capture_radius": 0.001, "visibility_radius": zeta}
-steps, horizon = {"P": 400_000}.get(what, 10), 0.005 if what == "newton-I2" else 0.05
+steps, horizon = {"P": 100_000}.get(what, 10), 0.005 if what == "newton-I2" else 0.05
 sc = tadcore.Scenario.model_validate({
     "interaction": "I2" if second else "I1", "horizon": horizon, "step": horizon / steps,
     "attacker": {"position": [-1.0, -1.0], "control_weight": 0.8, "capture_radius": 0.001},
@@ -144,7 +144,7 @@ os._exit(0)
         ("descent", 60),
         ("equilibrium", 300),
         ("equilibrium-I2", 500),
-        ("residual", 300),
+        ("residual", 200),
         ("P", 12),
         ("run", 60),
         ("batch", 30),
