@@ -19,7 +19,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, stats
 
 from tadcore._shared.arrays import as_amount, as_index
 from tadcore._shared.shares import estimate, percent
@@ -119,7 +118,10 @@ def start_share_of(both: int, one: int, none: int, *, outcome: str = "", level: 
         return StartShare(outcome, p, math.nan, 0.0, 1.0, both, one, none, confidence)
     spread = p * (1.0 - p)
     share = 1.0 - counts[1] / (2.0 * spread * starts)
-    limit = float(stats.chi2.isf(1.0 - confidence, 1))
+    from scipy.optimize import brentq
+    from scipy.special import chdtri
+
+    limit = float(chdtri(1, 1.0 - confidence))
     observed = np.array(counts, dtype=np.float64)
 
     def beyond(rho: float) -> float:
@@ -129,7 +131,7 @@ def start_share_of(both: int, one: int, none: int, *, outcome: str = "", level: 
         return float(min(terms.sum(), 1e300)) - limit
 
     least = max(-p / (1.0 - p), -(1.0 - p) / p)  # of any pair; that of a start is not below 0
-    low = optimize.brentq(beyond, least, share) if beyond(least) > 0.0 else least
-    high = optimize.brentq(beyond, share, 1.0) if beyond(1.0) > 0.0 else 1.0
+    low = brentq(beyond, least, share) if beyond(least) > 0.0 else least
+    high = brentq(beyond, share, 1.0) if beyond(1.0) > 0.0 else 1.0
     middle, left, right = (min(max(float(end), 0.0), 1.0) for end in (share, low, high))
     return StartShare(outcome, p, middle, left, right, both, one, none, confidence)

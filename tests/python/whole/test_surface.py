@@ -28,6 +28,10 @@ def test_a_scenario_needs_only_numpy_and_pydantic():
     assert loaded_after("import tadcore; tadcore.scenarios.load('paper-i1').to_toml()") <= {"numpy", "pydantic"}
 
 
+def test_maps_and_statistics_load_scipy_only_when_they_need_it():
+    assert loaded_after("import tadcore.analysis, tadcore.statistics") <= {"numpy", "pydantic", "pyarrow"}
+
+
 def test_everything_exported_is_there_and_documented():
     assert sorted(tadcore.__all__) == list(tadcore.__all__) or set(tadcore.__all__) <= set(dir(tadcore))
     for name in tadcore.__all__:
