@@ -193,7 +193,7 @@ class Programs:
 
     def __init__(self, tree, target, room):
         self.tree, self.target = tree, target
-        own = [(tests, f"{room}::") for tests in ("kernels", "tadcore")] + [(name, "") for name in TESTS if name == room]
+        own = [("kernels", f"{room}::"), ("tadcore", f"{room}::"), *((name, "") for name in TESTS if name == room)]
         self.order = own + [(name, "") for name in TESTS if name != room]
         self.built, self.limits = {}, {}
 
