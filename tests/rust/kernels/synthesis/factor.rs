@@ -53,7 +53,8 @@ fn both_factorisations_solve_the_same_system() {
         let full = layout.len();
         let mut b: Vec<f64> = (0..d).map(|i| (i as f64 + 1.0).sin()).collect();
         b.resize(full, 0.0);
-        for backend in backends() {
+        // Registers of one number without a fused product take half a minute for the large ones.
+        for backend in backends().into_iter().filter(|b| d < LIBRARY_SIZE || b.library || b.width != Width::Baseline) {
             let (mut f, mut x) = (vec![f64::NAN; full * full], b.clone());
             assert!(factorise(&h, damping, &layout, backend, &mut f).0);
             let form = forward(&f, full, &mut x);
