@@ -181,15 +181,15 @@ def test_where_there_is_nothing_to_choose_or_nothing_quartic():
 def test_the_report_and_the_command_line_print_the_gap(capsys):
     run = tadcore.simulate(tadcore.scenarios.load("paper-i2"))
     eq = tadcore.solve_equilibrium(run.scenario)
-    report = v.check_gains(run, eq, instants=4, bound=True)
+    report = v.check_gains(run, eq, instants=4, bound=1)
     assert report["gains.bound"].ok
     (gap,) = [m for m in report.measurements if m.name == "gains.gap"]
     assert 0 <= gap.value < 1
     assert "(Θ - lower bound)/Θ" in gap.meaning
     run.theta[:] *= 0.5  # no gains have it
-    assert not v.check_gains(run, eq, instants=4, bound=True)["gains.bound"].ok
+    assert not v.check_gains(run, eq, instants=4, bound=1)["gains.bound"].ok
     with pytest.raises(SystemExit) as left:
-        cli.main(["verify", "paper-i1", "--deviations", "0", "--bound"])
+        cli.main(["verify", "paper-i1", "--deviations", "0", "--bound", "1"])
     assert left.value.code == 0
     assert "gains.gap" in capsys.readouterr().out
 
@@ -198,9 +198,9 @@ def test_without_the_solver_the_error_names_the_extra(monkeypatch):
     sc = tadcore.scenarios.load("paper-i1")
     monkeypatch.setattr("tadcore.verification.bound.bounds.find_spec", lambda name: None)
     for ask in (
-        lambda: v.verify(sc, bound=True),
+        lambda: v.verify(sc, bound=1),
         lambda: v.theta_bound(sc, step=0, adjacency=np.ones((3, 4))),
-        lambda: v.check_gains(tadcore.simulate(sc), tadcore.solve_equilibrium(sc), bound=True),
+        lambda: v.check_gains(tadcore.simulate(sc), tadcore.solve_equilibrium(sc), bound=1),
     ):
         with pytest.raises(tadcore.ScenarioError, match=r"pip install 'tadcore\[bounds\]'"):
             ask()
