@@ -17,7 +17,6 @@ import numpy as np
 from tadcore import _core
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.worlds import DETECTIONS, SENSORS
-from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 _KEPT = 8
 _games: OrderedDict[Hashable, _core.Game] = OrderedDict()
@@ -34,9 +33,9 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_after_fork)
 
 
-def game_of(sc: ScenarioLike) -> _core.Game:
-    """The compiled game of a scenario, from a small cache keyed on its weights, horizon and grid."""
-    arguments = _arguments(as_scenario(sc))
+def game_of(sc: Scenario) -> _core.Game:
+    """The compiled game of a valid scenario, from a small cache keyed on its weights, horizon and grid."""
+    arguments = _arguments(sc)
     key = tuple(arguments.items())
     with _lock:
         game = _games.get(key)
