@@ -33,6 +33,7 @@ from tadcore.study.study import Study, StudyResult
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 _ENDS = (*KINDS, DIVERGED, NO_EQUILIBRIUM)  # as `Tally.kinds` counts them
 _LEVEL = 0.95
@@ -147,6 +148,12 @@ class SweepResult:
         for name in again:
             made = made.set_xindex(name)
         return made
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Draw probabilities over the grid, of one or two paths; see `tadcore.plotting.sweep`."""
+        from tadcore.plotting import sweep as draw
+
+        return draw(self, ax, **options)
 
     def _repr_html_(self) -> str:
         made = self.to_xarray()

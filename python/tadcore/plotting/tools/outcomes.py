@@ -92,14 +92,14 @@ def quantity_label(name: str) -> str:
 
 
 def input_label(name: str) -> str:
-    """``defenders.0.position.x`` and its like as symbols, anything else as it is."""
+    """``defenders.0.position.x``, radii and control weights as symbols, anything else as it is."""
     owner, _, rest = short(name).partition(".")
     if owner not in ("attacker", "target") and not is_defender(owner):
         return name
-    radius = {"visibility_radius": r"\zeta", "capture_radius": r"\sigma"}.get(rest)
+    letter = {"visibility_radius": r"\zeta", "capture_radius": r"\sigma", "control_weight": "r"}.get(rest)
     axis = rest.removeprefix("position.")
-    if radius:
-        return f"${radius}_{{{symbol(owner)}}}$"
+    if letter:
+        return f"${letter}_{{{symbol(owner)}}}$"
     return f"${axis}_{{{symbol(owner)}}}(0)$" if axis in ("x", "y", "z") else name
 
 
