@@ -10,7 +10,8 @@ monotone* in general: a defender that sees further plays another game from that 
 have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or bisection over the whole range is used.
 
 - **Pointwise** intervals are Wilson's; **bands** hold at all R radii at once, for one outcome: Clopper and Pearson's
-  exact intervals, each with (1 - level) / R (Bonferroni, whatever the dependence between radii).
+  exact intervals, each with (1 - level) / R (Bonferroni, whatever the dependence between radii). Of L players asked for
+  together they hold at all L R radii, each with (1 - level) / (L R).
 - **Differences** against a reference radius and **slopes** between neighbouring radii, the value of a unit of radius,
   :math:`(P(r_{k+1}) - P(r_k)) / (r_{k+1} - r_k)`, carry paired score intervals, each by itself.
 - Of a study that a rule was asked to stop, all of these are confidence sequences instead.
@@ -21,9 +22,12 @@ have won; so P(intercepted) may fall where ζ_i grows, and no monotone band or b
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
@@ -33,6 +37,7 @@ from tadcore.statistics import TrialOutcomes, outcome_names
 from tadcore.statistics.comparison import discordant
 from tadcore.statistics.confidence import Confidence
 from tadcore.statistics.outcomes import indicators
+from tadcore.statistics.radii import RadiusCurves
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences
 from tadcore.study.study import Study
 
@@ -40,12 +45,48 @@ from .breakpoints import breakpoints
 from .replays import Replays, refuse_random, seed_of, starts_of
 
 
+@overload
+def radius_curve(
+    source: ScenarioLike | Study | TrialOutcomes,
+    positions: ArrayLike | None = None,
+    *,
+    player: str = ...,
+    radii: ArrayLike,
+    kind: RadiusKind = ...,
+    reference: float | None = ...,
+    level: float | None = ...,
+    refine: bool = ...,
+    tolerance: float = ...,
+    seed: int = ...,
+    threads: int | None = ...,
+    progress: bool = ...,
+) -> RadiusCurve: ...
+
+
+@overload
+def radius_curve(
+    source: ScenarioLike | Study | TrialOutcomes,
+    positions: ArrayLike | None = None,
+    *,
+    player: list[str] | tuple[str, ...],
+    radii: ArrayLike,
+    kind: RadiusKind = ...,
+    reference: float | None = ...,
+    level: float | None = ...,
+    refine: bool = ...,
+    tolerance: float = ...,
+    seed: int = ...,
+    threads: int | None = ...,
+    progress: bool = ...,
+) -> RadiusCurves: ...
+
+
 @public
 def radius_curve(
     source: ScenarioLike | Study | TrialOutcomes,
     positions: ArrayLike | None = None,
     *,
-    player: str = "d1",
+    player: str | list[str] | tuple[str, ...] = "d1",
     radii: ArrayLike,
     kind: RadiusKind = "visibility",
     reference: float | None = None,
@@ -55,8 +96,8 @@ def radius_curve(
     seed: int = 0,
     threads: int | None = None,
     progress: bool = False,
-) -> RadiusCurve:
-    """Play the same starts at every radius of one player.
+) -> RadiusCurve | RadiusCurves:
+    """Play the same starts at every radius of one player, or of several, one after the other.
 
     Parameters
     ----------
@@ -65,15 +106,15 @@ def radius_curve(
         the radius in question.
     positions : array_like, shape (M, n + 2, dim), optional
         M independent starts; required with a Scenario, and not taken with a study.
-    player : str
+    player : str or list of str
         ``"d1"`` … ``"dn"`` (or ``"defenders[0]"`` …); in I2 ``"target"`` for its visibility, and ``"attacker"`` for its
-        capture radius.
+        capture radius. Of several, each has its curve, the others keeping their own radii.
     radii : array_like, shape (R,)
         Radii to play, increasing. Visibility may end in inf.
     kind : {"visibility", "capture"}
         ζ or σ.
     reference : float, optional
-        The radius to take differences against; the scenario's own by default.
+        The radius to take differences against; the player's own in the scenario by default.
     level : float
         Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop the study.
     refine : bool
@@ -89,8 +130,9 @@ def radius_curve(
 
     Returns
     -------
-    RadiusCurve
-        Probabilities, differences, slopes and, if asked for, breakpoints.
+    RadiusCurve or RadiusCurves
+        Probabilities, differences, slopes and, if asked for, breakpoints; of a list of players one for each, with
+        bands that hold for all of them at once.
 
     Raises
     ------
@@ -103,13 +145,47 @@ def radius_curve(
     sc, rows = starts_of(source, positions)
     if refine:
         refuse_random(sc, "refine", "leave it out; the curve itself shares failures and disturbances between radii")
-    games = Replays(sc, rows, player, kind, threads, seed_of(source, seed))
-    grid = games.checked("radii", radii)
+    players = [player] if isinstance(player, str) else _several(player)
+    draws = seed_of(source, seed)
+    games = [Replays(sc, rows, name, kind, threads, draws) for name in players]
+    if len({each.player for each in games}) < len(games):
+        raise ScenarioError("player", player, "players that are named once each")
+    asked = [(each.checked("radii", radii), _reference(each, reference)) for each in games]
+    grid = asked[0][0]
     if grid.ndim != 1 or grid.size == 0 or np.any(grid[1:] <= grid[:-1]):
         raise ScenarioError("radii", radii, "a list of increasing radii")
-    if reference is not None and np.ndim(reference):
+    places = len(games) * len(grid)
+    curves = tuple(
+        _curve(each, grid, own, sure, places, tolerance if refine else None, progress=progress)
+        for each, (_, own) in zip(games, asked, strict=True)
+    )
+    return curves[0] if isinstance(player, str) else RadiusCurves(curves)
+
+
+def _several(players: object) -> list[str]:
+    """The players of a list of them."""
+    if not isinstance(players, list | tuple) or not players:
+        raise ScenarioError("player", players, 'a player such as "d1", or a list of them')
+    for player in players:
+        if not isinstance(player, str):
+            raise ScenarioError("player", player, 'a player such as "d1"')
+    return list(players)
+
+
+def _reference(games: Replays, reference: float | None) -> float:
+    """The radius that differences are taken against."""
+    if reference is None:
+        return games.own
+    if np.ndim(reference):
         raise ScenarioError("reference", reference, "one radius")
-    own = games.own if reference is None else float(games.checked("reference", reference))
+    return float(games.checked("reference", reference))
+
+
+def _curve(
+    games: Replays, grid: Floats, own: float, sure: Confidence, places: int, tolerance: float | None, *, progress: bool
+) -> RadiusCurve:
+    """The curve of one player, with a band that holds at so many places at once, its own radii among them."""
+    sc, kind, trials = games.sc, games.kind, len(games.rows)
     played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {games.player}", show=progress)]
     same = np.flatnonzero(grid == own)
     base = played[same[0]] if same.size else games.play(own)
@@ -129,9 +205,8 @@ def radius_curve(
         against_last.append(discordant(event, last))
         last = event
     count = np.array(counts).T
-    trials = len(rows)
     low, high = sure.ends(count, trials, "wilson")
-    band_low, band_high = sure.band(count, trials, len(grid))
+    band_low, band_high = sure.band(count, trials, places)
     difference = paired_differences(against_reference, trials, sure.level, sure.paired)
     slope = paired_differences(against_last, trials, sure.level, sure.paired)[..., 1:] / np.diff(grid)
     return RadiusCurve(
@@ -139,7 +214,7 @@ def radius_curve(
         radius=kind,
         radii=grid,
         names=outcome_names(sc.n, diverged=lost),
-        estimate=count / len(rows),
+        estimate=count / trials,
         low=low,
         high=high,
         band_low=band_low,
@@ -155,6 +230,6 @@ def radius_curve(
         defender=np.array([batch.defender for batch in played]),
         diverged=np.array([batch.diverged for batch in played]),
         level=sure.level,
-        breakpoints=breakpoints(games, grid, played, tolerance) if refine else None,
+        breakpoints=None if tolerance is None else breakpoints(games, grid, played, tolerance),
         rule=sure.rule,
     )

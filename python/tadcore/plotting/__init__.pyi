@@ -17,6 +17,7 @@ from .study.charts import (
 from .study.joint import outcomes_over as outcomes_over
 from .study.maps import outcome_map as outcome_map
 from .study.probability import probability_map as probability_map
+from .study.radii import radius_curves as radius_curves
 from .study.shares import outcomes_by_input as outcomes_by_input, outcomes_by_inputs as outcomes_by_inputs
 from .study.sweeps import sweep as sweep
 from .tools.labels import Labels as Labels

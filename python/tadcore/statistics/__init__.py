@@ -8,6 +8,7 @@ from .comparison import Comparison, compare, difference_interval, paired
 from .incidence import Incidence, incidence, incidence_of
 from .intervals import OutcomeProbabilities, probabilities, probabilities_of, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
+from .radii import RadiusCurves
 from .radius import RadiusCurve
 from .sequences import HalfWidth, mixture_interval
 from .single_radii import Breakpoints, SmallestRadius
@@ -22,6 +23,7 @@ __all__ = [
     "Incidence",
     "OutcomeProbabilities",
     "RadiusCurve",
+    "RadiusCurves",
     "SmallestRadius",
     "StartShare",
     "Stopping",

@@ -260,3 +260,40 @@ def test_a_study_need_not_be_played_first(sc):
     study = tadcore.Study(sc, {"attacker.position": Disk([-2, 2], 1.0)}, trials=40, seed=3)
     fresh, played = (radius_curve(source, player="d1", radii=[1.0, 5.0]) for source in (study, study.run()))
     assert np.array_equal(fresh.kind, played.kind)
+
+
+def test_several_players_have_a_curve_each_and_bands_for_all(sc, positions, curve):
+    both = radius_curve(sc, positions, player=["d2", "defenders[0]"], radii=RADII)
+    assert both.players == ("d2", "d1")
+    assert [each.player for each in both] == ["d2", "d1"]
+    alone = radius_curve(sc, positions, player="d1", radii=RADII)
+    for found, one in ((both["d2"], curve), (both["defenders[0]"], alone)):
+        for name in ("estimate", "low", "high", "difference_low", "slope_high", "kind", "reference"):
+            assert np.array_equal(getattr(found, name), getattr(one, name)), name
+        count = np.rint(one.estimate * 60).astype(int)
+        wide = proportion_interval(count, 60, level=1 - 0.05 / (2 * len(RADII)), method="exact")
+        assert np.array_equal((found.band_low, found.band_high), wide)
+    made = both.to_xarray()
+    assert made["reference"].values.tolist() == sc.visibility_radii[[1, 0]].tolist()
+    assert np.array_equal(made["band_low"].sel(player="d1"), both["d1"].band_low)
+    assert both.smallest(0.2)["d1"].radius == both["d1"].smallest(0.2).radius
+    assert "d1" in repr(both)
+    assert "at all radii of all players at once" in both._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("player", "said"),
+    [
+        ([], "a player such as"),
+        (["d1", 2], "a player such as"),
+        (["d1", "defenders[0]"], "players that are named once each"),
+        (["d1", "d9"], "one that has a visibility radius: d1, d2, d3"),
+        (3, "a player such as"),
+    ],
+)
+def test_players_that_are_none_are_refused(sc, positions, player, said):
+    with pytest.raises(ScenarioError, match=said):
+        radius_curve(sc, positions, player=player, radii=RADII)
+    both = radius_curve(sc, positions[:2], player=["d1"], radii=[1.0])
+    with pytest.raises(ScenarioError, match="one of d1"):
+        both["d2"]

@@ -64,6 +64,7 @@ def said(sc, result):
         "incidence": statistics.incidence(result.kind, result.defender, result.time, horizon=6, step=0.005, n=3),
         "comparison": statistics.paired(result.kind, result.defender, narrow.kind, narrow.defender, 3),
         "radius": tadcore.radius_curve(sc, result.positions[:60], player="d2", radii=np.linspace(0.2, 3, 6)),
+        "radii": tadcore.radius_curve(sc, result.positions[:60], player=["d1", "d3"], radii=np.linspace(0.2, 3, 6)),
         "sensitivity": sobol(
             lambda x: np.array([x[0] + 0.1 * x[1], 0 * x[0]]), distributions, ["time", "d1"], points=32, resamples=20
         ),
@@ -78,6 +79,7 @@ DRAWN = {
     "incidence apart": lambda said, ax: plotting.incidence(said["incidence"], ax, stacked=False),
     "comparison": lambda said, ax: plotting.comparison(said["comparison"], ax),
     "radius": lambda said, ax: plotting.radius_curve(said["radius"], ax),
+    "radii": lambda said, ax: plotting.radius_curves(said["radii"], ax),
     "radius difference": lambda said, ax: plotting.radius_curve(said["radius"], ax, quantity="difference"),
     "radius slope": lambda said, ax: plotting.radius_curve(said["radius"], ax, quantity="slope", outcomes=["d1", "d2"]),
     "sensitivity": lambda said, ax: plotting.sensitivity(said["sensitivity"], ax=ax),
@@ -194,6 +196,15 @@ def test_a_comparison_fills_what_is_sure(said):
     sure = (found.low > 0) | (found.high < 0)
     assert [mark.get_markerfacecolor() != "white" for mark in marks] == sure.tolist()
     assert ax.get_xlabel() == "$P$(wide) − $P$(narrow)"
+
+
+def test_radii_of_several_players_are_a_line_each(said):
+    curves = said["radii"]
+    ax = plotting.radius_curves(curves, agg_figure()[1], outcome="captured")
+    drawn = [line for line in ax.lines if len(line.get_xdata()) == 6]
+    assert [line.get_ydata().tolist() for line in drawn] == [each.estimate[1].tolist() for each in curves]
+    with pytest.raises(ValueError, match="no outcome 'won'"):
+        plotting.radius_curves(curves, outcome="won")
 
 
 def test_a_radius_curve_shows_what_it_is_asked_for(said):

@@ -186,7 +186,7 @@ def test_what_is_no_name_is_refused_by_name(given):
         lambda: eq.full(given, 0),
         lambda: tadcore.synthesize(SC, step=0, adjacency=[[1] * 4] * 3, method=given),
         lambda: Study(SC, vary={"attacker.position": sampling.Box(-1, 1)}, trials=1, design=given),
-        lambda: tadcore.radius_curve(SC, STARTS, player=given, radii=[1.0]),
+        lambda: tadcore.radius_curve(SC, STARTS, player=[given], radii=[1.0]),
         lambda: tadcore.radius_curve(SC, STARTS, kind=given, radii=[1.0]),
         lambda: run.plot.controls(axis=given) if given is not None else tadcore.scenarios.load(given),
     ):
@@ -419,7 +419,6 @@ def test_flags_are_true_or_false(agg):
         for use, name in (
             (lambda x: run.plot.trajectories(zoom=x), "zoom"),
             (lambda x: run.plot.gains(changes=x), "changes"),
-            (lambda x: tadcore.verify(run, bound=x), "bound"),
             (lambda x: tadcore.outcome_map(SC, x=(0, 1, 2), y=(0, 1, 2), progress=x), "progress"),
             (lambda x: tadcore.radius_curve(study, player="d1", radii=[2.0], refine=x), "refine"),
         ):
