@@ -16,6 +16,7 @@ from . import (
     verification as verification,
 )
 from ._core import __version__ as __version__
+from .analysis.budget import BestRadii as BestRadii, best_radii as best_radii
 from .analysis.maps import OutcomeMap as OutcomeMap, outcome_map as outcome_map
 from .analysis.placement import BestStart as BestStart, best_start as best_start
 from .analysis.probabilities import ProbabilityMap as ProbabilityMap, probability_map as probability_map

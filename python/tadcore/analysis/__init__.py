@@ -3,6 +3,7 @@
 from tadcore.statistics.radius import RadiusCurve
 from tadcore.statistics.sobol import Sensitivity, sobol
 
+from .budget import BestRadii, best_radii
 from .maps import OutcomeMap, outcome_map
 from .placement import BestStart, best_start
 from .probabilities import ProbabilityMap, probability_map
@@ -12,12 +13,14 @@ from .starts import start_share
 from .sweeps import SweepResult, sweep
 
 __all__ = [
+    "BestRadii",
     "BestStart",
     "OutcomeMap",
     "ProbabilityMap",
     "RadiusCurve",
     "Sensitivity",
     "SweepResult",
+    "best_radii",
     "best_start",
     "outcome_map",
     "probability_map",

@@ -1,31 +1,25 @@
-r"""Where to place a player: the start at which an outcome is most probable.
-
-Every start is played with the same trials: common random numbers. So P, as estimated from M fixed trials, is a function
-of the start without noise, piecewise constant, which an optimiser can search. The start that it returns was chosen for
-the trials that it was chosen with, so its share there is too high: it is played again with fresh trials, and those are
-reported.
-"""
+"""Where to place a player: the start at which an outcome is most probable."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
-from tadcore._shared.progress import bar
 from tadcore._shared.shares import estimate
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
-from tadcore.statistics import difference_interval, outcome_names, proportion_interval
+from tadcore.statistics import outcome_names
 from tadcore.statistics.outcomes import as_level
 from tadcore.study.study import Study
 
 from .replays import Placed
+from .searches import fresh_study, judged, search
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -144,51 +138,24 @@ def best_start(
     >>> found.low <= found.estimate <= found.high
     True
     """
-    from scipy.optimize import direct
-
-    if not isinstance(study, Study):
-        raise ScenarioError("study", study, "a tadcore.Study: fresh trials are drawn from it")
     confidence, most = as_level(level), as_index("evaluations", evaluations, 10**7, least=20)
-    fresh_seed = (study.seed + 1) % 2**64 if seed is None else as_index("seed", seed, 2**64 - 1)
-    if fresh_seed == study.seed:
-        raise ScenarioError("seed", seed, "another than the study's own: the fresh trials must be new")
-    again = study.replace(seed=fresh_seed)
-    for one in (study, again):
-        one.check(progress=progress)
-    games = Placed(study, player, threads)
+    again = fresh_study(study, seed, progress=progress)
+    games, fresh = Placed(study, player, threads), Placed(again, player, threads)
     names = outcome_names(games.sc.n, diverged=True)
     which = names.index(one_of("outcome", outcome, names))
+
+    def share(place: Floats) -> float:
+        return float(games.events(place[np.newaxis])[which].mean())
+
     bounds = _bounds(games.sc, x, y, z)
-    steps = iter(bar(range(most), f"best start of {games.player}", show=progress))
-    played = 0
-
-    def loss(place: Floats) -> float:
-        nonlocal played
-        next(steps, None)
-        played += 1
-        return -float(games.events(place[np.newaxis])[which].mean())
-
-    found = direct(loss, bounds, maxfun=most, maxiter=most, vol_tol=0.0, len_tol=0.0)
-    for _ in steps:
-        pass
-    fresh = Placed(again, player, threads)
-    events = fresh.events(np.array([found.x, fresh.own]))[which]
-    hits, own = int(events[0].sum()), int(events[1].sum())
-    low, high = proportion_interval(hits, fresh.trials, level=confidence, method="exact")
-    better, worse = (int(np.count_nonzero(events[i] & ~events[1 - i])) for i in (0, 1))
-    gain_low, gain_high = difference_interval(better, worse, fresh.trials, level=confidence)
+    place, searched, played = search(share, bounds, most, f"best start of {games.player}", progress=progress)
+    events = fresh.events(np.array([place, fresh.own]))[which]
     return BestStart(
         player=games.player,
         outcome=names[which],
-        position=tuple(map(float, found.x)),
-        estimate=hits / fresh.trials,
-        low=float(low),
-        high=float(high),
-        own=own / fresh.trials,
-        gain=(hits - own) / fresh.trials,
-        gain_low=float(gain_low),
-        gain_high=float(gain_high),
-        searched=-float(found.fun),
+        position=tuple(map(float, place)),
+        **asdict(judged(events[0], events[1], confidence)),
+        searched=searched,
         evaluations=played,
         trials=fresh.trials,
         level=confidence,

@@ -36,6 +36,7 @@ calls = {
     "map": lambda: tadcore.outcome_map(sc, x=(-5, 5, 4_000), y=(-5, 5, 4_000)),
     "probability map": lambda: tadcore.probability_map(study, "d3", x=(-2, 2, 200), y=(-2, 2, 200)),
     "best start": lambda: tadcore.best_start(study, "d3", x=(-2, 2), y=(-2, 2)),
+    "best radii": lambda: tadcore.best_radii(study, 6.0, evaluations=10_000),
     "curve": lambda: tadcore.radius_curve(study, player="d1", radii=np.linspace(0.5, 6, 500), refine=True),
     "sweep": lambda: tadcore.sweep(study, {"attacker.control_weight": np.linspace(0.4, 2, 50)}),
     "sensitivity": lambda: tadcore.analysis.sensitivity(
@@ -65,7 +66,7 @@ except KeyboardInterrupt:
     print("interrupted", time.monotonic(), flush=True)
 os._exit(0)
 """
-QUESTIONS = ["verify", "map", "probability map", "best start", "curve", "sweep"]
+QUESTIONS = ["verify", "map", "probability map", "best start", "best radii", "curve", "sweep"]
 STATISTICS = ["sensitivity", "probabilities", "incidence", "intervals"]
 
 
