@@ -14,6 +14,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.game.recorded import Recorded
 from tadcore.plotting.run.network import aside, draw_graph
 from tadcore.plotting.run.paths import disc
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.inset import filled
 from tadcore.plotting.tools.style import edge_text, look, outcome_text, world_text
 
@@ -44,7 +45,7 @@ class Scene:
         self._graph = self.figure.add_axes((0.69, 0.14, 0.3, 0.3 / _HEIGHT))
         self._clock = self.figure.text(0.07, 0.955, "", ha="left", va="center", family="monospace")
         self._event = self.figure.text(0.65, 0.955, "", ha="right", va="center")
-        self.figure.text(0.985, 0.03, world_text(run), ha="right", va="center", fontsize="x-small", color="0.3")
+        self.figure.text(0.985, 0.03, world_text(run), ha="right", va="center", fontsize="x-small", color=ink(0.3))
         self._seen: list[Line2D] = []
         self._network: object = None
         self._over = False
@@ -139,7 +140,7 @@ class Scene:
         names = self._run.scenario.players
         ends = self._where[k, [names.index(observer), names.index(seen)]]
         style = "--" if dashed else "-"
-        (line,) = self._arena.plot(*ends.T, color="black", linestyle=style, linewidth=1.4, zorder=2.8)
+        (line,) = self._arena.plot(*ends.T, color=ink(), linestyle=style, linewidth=1.4, zorder=2.8)
         return line
 
     def _make_arena(self) -> Axes:
@@ -163,17 +164,17 @@ class Scene:
         it = look(player)
         nothing = np.empty((0, self._where.shape[-1]))
         size = {"*": 11.0, "X": 8.5}.get(it.marker, 7.5)
-        halo = [withStroke(linewidth=2.0, foreground="white")]
+        halo = [withStroke(linewidth=2.0, foreground=paper())]
         (trail,) = self._arena.plot(*nothing.T, color=it.colour, linewidth=0.9, alpha=0.5, zorder=2.0)
         (recent,) = self._arena.plot(*nothing.T, color=it.colour, linewidth=2.0, zorder=2.5)
         (marker,) = self._arena.plot(
             *nothing.T, linestyle="none", color=it.colour, marker=it.marker, markersize=size,
-            markeredgecolor="white", markeredgewidth=0.7, zorder=3.2,
+            markeredgecolor=paper(), markeredgewidth=0.7, zorder=3.2,
         )  # fmt: skip
         mover: dict[str, Any] = {"trail": trail, "recent": recent, "marker": marker}
         if self._run.course is not None and not self._run.course.sensor_up.all():
             (mover["failure"],) = self._arena.plot(
-                *nothing.T, linestyle="none", color="black", marker="x", markersize=1.6 * size, markeredgewidth=1.4,
+                *nothing.T, linestyle="none", color=ink(), marker="x", markersize=1.6 * size, markeredgewidth=1.4,
                 zorder=3.3,
             )  # fmt: skip
         if np.isfinite(self._radii.get(player, np.inf)):

@@ -13,6 +13,7 @@ from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.ground import paper
 from tadcore.plotting.tools.style import COLUMN, look, outcome_text, time_label
 
 from .paths import LAID_UNDER, name_runs
@@ -84,7 +85,7 @@ def compare(
             (curve,) = ax.plot(run.times, values, **common, **width)
             # dashes say which run it is, so markers along the way say whose curve, in greyscale too
             step = max(len(values) // 5, 1)
-            curve.set(marker=it.marker, markersize=3.4, markerfacecolor="white", markeredgewidth=0.8)
+            curve.set(marker=it.marker, markersize=3.4, markerfacecolor=paper(), markeredgewidth=0.8)
             curve.set_markevery((min(step // 2 + i * step // len(shown), len(values) - 1), step))
             ax.plot(run.times[-1:], values[-1:], marker=it.marker, markersize=3.4, clip_on=False, **common)
             if run is last:

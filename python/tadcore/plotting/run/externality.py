@@ -11,6 +11,7 @@ from tadcore.game.externality import control_jumps
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_run, new_axes
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.style import PAGE, edge_text, look
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
         ax.vlines(at[there], 0.0, size[there], color=it.colour, linestyle=it.dashes, linewidth=1.0)
         for filled in (True, False):
             shown = there & (own == filled)
-            face = it.colour if filled else "white"
+            face = it.colour if filled else paper()
             ax.plot(
                 at[shown],
                 size[shown],
@@ -71,8 +72,8 @@ def externality(run: Recorded, *, ax: Axes | None = None) -> Axes:
                 clip_on=False,
             )
         ax.plot([], [], linestyle="none", marker=it.marker, color=it.colour, label=it.symbol)
-    ax.plot([], [], linestyle="none", marker="o", color="0.3", label="own edge")
-    ax.plot([], [], linestyle="none", marker="o", color="0.3", markerfacecolor="white", label="another's edge")
+    ax.plot([], [], linestyle="none", marker="o", color=ink(0.3), label="own edge")
+    ax.plot([], [], linestyle="none", marker="o", color=ink(0.3), markerfacecolor=paper(), label="another's edge")
     ax.set_ylabel("jump of the control")
     ax.set_ylim(bottom=0.0)
     ax.set_xlim(-0.6, max(count - 0.4, 0.6))

@@ -12,6 +12,7 @@ from tadcore._shared.calls import public
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_panels, as_run, new_panels
+from tadcore.plotting.tools.ground import ink
 from tadcore.plotting.tools.style import look, symbol, time_label
 
 from .series import MAX_VERTICALS, mark_changes, span
@@ -58,7 +59,7 @@ def gains(
         for j, player in enumerate(entries):
             it = look(player)
             ax.plot(run.times, run.gains[:, i, j], color=it.colour, linestyle=it.dashes, linewidth=0.5 if thin else 1.1)
-        ax.axhline(0.0, color="0.7", linewidth=0.5, zorder=1.0)
+        ax.axhline(0.0, color=ink(0.7), linewidth=0.5, zorder=1.0)
         ax.set(xlim=span(run.times), ylabel=f"$g_{{{symbol(observer)}}}$")
         ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
         if changes:

@@ -15,6 +15,7 @@ from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_panels, as_run, new_panels
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.style import look, note, outcome_text, world_text
 
 if TYPE_CHECKING:
@@ -24,10 +25,10 @@ if TYPE_CHECKING:
 _NARROW = 1.6  # inches; titles of narrower panels are set small, so that neighbours do not touch
 _SMALL = 7.5  # points
 
-_OLD: dict[str, Any] = {"color": "0.62", "linewidth": 0.9, "linestyle": "-", "mutation_scale": 7, "zorder": 2.0}
-_NEW: dict[str, Any] = {"color": "black", "linewidth": 1.9, "linestyle": "-", "mutation_scale": 10, "zorder": 2.4}
+_OLD: dict[str, Any] = {"linewidth": 0.9, "linestyle": "-", "mutation_scale": 7, "zorder": 2.0}
+_NEW: dict[str, Any] = {"linewidth": 1.9, "linestyle": "-", "mutation_scale": 10, "zorder": 2.4}
 _TOLD: dict[str, Any] = {"linestyle": (0, (4.0, 1.6))}
-_LOST: dict[str, Any] = {"color": "0.45", "linewidth": 0.9, "linestyle": ":", "mutation_scale": 7, "zorder": 1.8}
+_LOST: dict[str, Any] = {"linewidth": 0.9, "linestyle": ":", "mutation_scale": 7, "zorder": 1.8}
 
 
 @public
@@ -124,10 +125,10 @@ def draw_graph(
     ax.set(xlim=(-1.32, 1.32), ylim=(-1.32, 1.32), xticks=[], yticks=[])
     ax.set_aspect("equal", adjustable="box")
     for spine in ax.spines.values():
-        spine.set(color="0.8", linewidth=0.5)
+        spine.set(color=ink(0.8), linewidth=0.5)
     for edge in sorted(edges | lost):
-        kind = _LOST if edge in lost else _NEW if edge in new else _OLD
-        kind = kind | _TOLD if edge in told - lost else kind
+        kind, grey = (_LOST, 0.45) if edge in lost else (_NEW, 0.0) if edge in new else (_OLD, 0.62)
+        kind = {"color": ink(grey)} | kind | (_TOLD if edge in told - lost else {})
         twin = (edge[1], edge[0]) in edges | lost
         _arrow(ax, at[edge[0]], at[edge[1]], node, bend=0.16 if twin else 0.0, kind=kind)
     for player, place in at.items():
@@ -141,7 +142,7 @@ def draw_graph(
             fontsize="small",
             zorder=3.1,
             bbox={"boxstyle": "circle,pad=0.22", "edgecolor": it.colour, "linewidth": 1.1}
-            | ({"facecolor": "0.7", "linestyle": ":"} if player in failed else {"facecolor": "white"}),
+            | ({"facecolor": ink(0.7), "linestyle": ":"} if player in failed else {"facecolor": paper()}),
         )
 
 

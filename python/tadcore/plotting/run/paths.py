@@ -13,6 +13,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.game.passes import Pass
 from tadcore.game.recorded import Recorded
 from tadcore.plotting.tools.axes import above
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.style import look
 
 if TYPE_CHECKING:
@@ -52,12 +53,12 @@ def paths(ax: Axes, run: Recorded, *, dashed: bool, marks: Floats | None = None)
             ax.plot(*path[-1:].T, markerfacecolor=pale, markersize=0.85 * size, zorder=3.1, **common, **rim)
             continue
         # a white rim keeps markers apart where several paths end together
-        rim = {"markeredgecolor": "white", "markeredgewidth": 0.5}
+        rim = {"markeredgecolor": paper(), "markeredgewidth": 0.5}
         ax.plot(*path[-1:].T, markerfacecolor=it.colour, markersize=size + 1.4, zorder=3.2, **common, **rim)
         marked = marks is not None and len(marks) > 0 and bool((np.linalg.norm(marks - path[0], axis=1) < near).any())
         ax.plot(
             *path[:1].T,
-            markerfacecolor="white",
+            markerfacecolor=paper(),
             markeredgecolor=it.colour,
             markersize=size * (1.9 if marked else 1.0),
             zorder=3.2,
@@ -82,8 +83,8 @@ def drops(ax: Axes, run: Recorded, floor: float) -> None:
 def name_runs(ax: Axes, names: tuple[str, str]) -> None:
     """Say above the axes which run is solid and which is dashed, below one another where the names are long."""
     handles = [
-        Line2D([], [], color="0.2", linestyle="-", label=names[0]),
-        Line2D([], [], color="0.2", linestyle=LAID_UNDER, label=names[1]),
+        Line2D([], [], color=ink(0.2), linestyle="-", label=names[0]),
+        Line2D([], [], color=ink(0.2), linestyle=LAID_UNDER, label=names[1]),
     ]
     above(ax, handles, fontsize="small", columnspacing=1.0, handlelength=1.8)
 

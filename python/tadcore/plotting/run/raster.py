@@ -14,6 +14,7 @@ from tadcore.game.network import Edge
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_run, new_axes, root_figure
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, time_label, world_text
 
 if TYPE_CHECKING:
@@ -59,12 +60,12 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
         solid, hollow = ([(a, b - a) for a, b in bars.get(edge, [])] for bars in (seen, told))
         ax.broken_barh(solid, (row - 0.36, 0.72), color=colour, linewidth=0, zorder=2.0)
         if hollow:
-            ax.broken_barh(hollow, (row - 0.24, 0.48), facecolor="white", edgecolor=colour, linewidth=0.8, zorder=1.9)
+            ax.broken_barh(hollow, (row - 0.24, 0.48), facecolor=paper(), edgecolor=colour, linewidth=0.8, zorder=1.9)
         ax.axhline(row, color=colour, linewidth=0.4, alpha=0.5, zorder=1.0)
     failed = _shade_failures(ax, run, rows)
     for row in range(1, len(rows)):
         if rows[row][0] != rows[row - 1][0]:
-            ax.axhline(row - 0.5, color="0.4", linewidth=0.5, zorder=1.1)
+            ax.axhline(row - 0.5, color=ink(0.4), linewidth=0.5, zorder=1.1)
     end = float(run.outcome.time) or 1.0
     ax.set(xlabel=time_label(run), xlim=(0.0, end), ylim=(max(len(rows), 1) - 0.4, -0.6))
     _name(ax, rows)
@@ -72,8 +73,8 @@ def visibility(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -
     times = [change.time for change in run.network_changes[1:]]
     if changes and len(times) <= MAX_ROWS:
         segments = [[(t, 0.0), (t, 1.0)] for t in times]
-        lines = LineCollection(segments, transform=ax.get_xaxis_transform(), colors="0.45", linewidths=0.6, zorder=2.4)
-        lines.set_linestyle((0, (4, 2.5)))
+        lines = LineCollection(segments, transform=ax.get_xaxis_transform(), colors=ink(0.45), linewidths=0.6)
+        lines.set(linestyle=(0, (4, 2.5)), zorder=2.4)
         ax.add_collection(lines, autolim=False)
     absent = len(run.scenario.constrained) * (run.scenario.n + 1) - len(rows)
     remarks = [f"{absent} edges never form and are left out"] if absent else []
@@ -93,7 +94,7 @@ def _shade_failures(ax: Axes, run: Recorded, rows: list[Edge]) -> bool:
         own = [row for row, (observer, _) in enumerate(rows) if observer == run.scenario.constrained[i]]
         if own:
             band = (min(own) - 0.5, len(own))
-            ax.broken_barh([(a, b - a) for a, b in spans], band, color="0.82", linewidth=0, zorder=0.5)
+            ax.broken_barh([(a, b - a) for a, b in spans], band, color=ink(0.82), linewidth=0, zorder=0.5)
     return bool(down)
 
 

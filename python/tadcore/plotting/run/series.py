@@ -16,6 +16,7 @@ from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import above, as_run, new_axes
 from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.style import COLUMN, look, note, time_label
 
 from .paths import PASSED, colour_of, count_passes
@@ -114,7 +115,7 @@ def distances(run: Recorded, *, ax: Axes | None = None, changes: bool = True) ->
     rims: list[tuple[float, str, str]] = []
     sigma = run.scenario.capture_radii
     if np.ptp(sigma) == 0:
-        rims.append((float(sigma[0]), r"$\sigma$", "0.25"))
+        rims.append((float(sigma[0]), r"$\sigma$", ink(0.25)))
     else:
         symbols = [rf"$\sigma_{{{look(p).symbol.strip('$')}}}$" for p in [*names[:-1], "attacker"]]
         colours = [look(p).colour for p in [*names[:-1], "attacker"]]
@@ -168,7 +169,7 @@ def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axe
     scale = float(max(total.max(), terms.max()))
     ax.set(xlabel=time_label(run), ylabel=r"$\Theta$ and its terms", xlim=span(times))
     if scale <= 0:
-        ax.plot(times, total, color="black")
+        ax.plot(times, total, color=ink())
         ax.set_ylim(-1, 1)
         ax.text(0.5, 0.56, r"$\Theta=0$: everyone sees everyone", transform=ax.transAxes, ha="center", va="bottom")
         return ax
@@ -181,7 +182,7 @@ def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axe
         (line,) = ax.plot(
             times,
             positive,
-            color=it.colour if it else "black",
+            color=it.colour if it else ink(),
             linestyle=it.dashes if it else "-",
             linewidth=1.0 if it else 1.6,
             zorder=2.5 if it else 2.8,
@@ -192,7 +193,8 @@ def theta(run: Recorded, *, ax: Axes | None = None, changes: bool = True) -> Axe
     quiet = times[np.flatnonzero(total > 1e-12 * scale)[-1]]
     if times[-1] - quiet > 0.15 * times[-1]:
         middle = 0.5 * (quiet + times[-1])
-        ax.text(middle, 0.5, r"$\Theta=0$", transform=ax.get_xaxis_transform(), ha="center", va="center", color="0.3")
+        where = ax.get_xaxis_transform()
+        ax.text(middle, 0.5, r"$\Theta=0$", transform=where, ha="center", va="center", color=ink(0.3))
     if changes:
         mark_changes(ax, run)
     return ax
@@ -237,7 +239,7 @@ def _curves(ax: Axes, run: Recorded, curves: dict[str, Floats], rims: Sequence[t
             linewidth=0.5 if restless else None,
             marker=it.marker,
             markersize=6.0 if it.marker == "*" else 3.8,
-            markerfacecolor="white",
+            markerfacecolor=paper(),
             markeredgewidth=0.9,
             markevery=(min(step // 2 + i * step // max(len(curves), 1), len(times) - 1), step),
             zorder=2.5,
@@ -251,7 +253,7 @@ def _curves(ax: Axes, run: Recorded, curves: dict[str, Floats], rims: Sequence[t
 def mark_changes(ax: Axes, run: Recorded, *, say: bool = True) -> None:
     """Mark each network change: a dashed vertical, or a tick at the foot and a remark where they are many."""
     times = [change.time for change in run.network_changes[1:]]
-    kind: dict[str, Any] = {"color": "0.45", "zorder": 1.2}
+    kind: dict[str, Any] = {"color": ink(0.45), "zorder": 1.2}
     if len(times) <= MAX_VERTICALS:
         for t in times:
             ax.axvline(t, linewidth=0.7, linestyle=(0, (4, 2.5)), **kind)

@@ -13,6 +13,7 @@ from tadcore._shared.calls import public
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.plotting.tools.axes import as_axes, as_run, new_axes
+from tadcore.plotting.tools.ground import ink
 from tadcore.plotting.tools.inset import crowd, magnify
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.style import COLUMN, edge_text, look, note, outcome_text, world_text
@@ -216,10 +217,10 @@ def _edges(ax: Axes, run: Recorded, marks: list[_Mark], labels: Labels) -> None:
             marker="D" if named else "|",
             markersize=3.6 if named else 4,
             markerfacecolor=it.colour,
-            markeredgecolor="black" if named else it.colour,
+            markeredgecolor=ink() if named else it.colour,
             markeredgewidth=0.6,
             zorder=3.3 if named else 2.7,
         )
     for mark in labelled:
         labels.avoid_spot(mark.point, 3.0)
-        labels.add(mark.point, mark.text, color="black", fontsize="small")
+        labels.add(mark.point, mark.text, color=ink(), fontsize="small")

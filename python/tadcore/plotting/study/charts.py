@@ -14,6 +14,7 @@ from tadcore._shared.calls import public
 from tadcore._shared.shares import estimate, percent
 from tadcore.plotting.tools.axes import above, new_axes
 from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.ground import ink, paper
 from tadcore.plotting.tools.outcomes import boxes, input_label, listed, outcome_look, parts_of, quantity_label, stack
 from tadcore.plotting.tools.style import COLUMN, symbol
 from tadcore.statistics import Comparison, Incidence, OutcomeProbabilities, RadiusCurve
@@ -53,7 +54,7 @@ def outcome_probabilities(found: OutcomeProbabilities, ax: Axes | None = None) -
         )
     _rows(ax, [outcome_look(name).label for name in found.names])
     ax.set(xlabel="probability", xlim=(0.0, min(1.0, float(found.high.max())) * 1.2))
-    ax.axvline(0.0, color="0.25", linewidth=0.6, zorder=2.2)
+    ax.axvline(0.0, color=ink(0.25), linewidth=0.6, zorder=2.2)
     return ax
 
 
@@ -91,9 +92,9 @@ def incidence(found: Incidence, ax: Axes | None = None, *, stacked: bool = True,
         if bands:
             i = found.names.index("intercepted")
             for edge in (found.low[i], found.high[i]):
-                ax.step(found.times, edge, where="post", color="black", linewidth=0.8, linestyle=(0, (1, 1.2)))
+                ax.step(found.times, edge, where="post", color=ink(), linewidth=0.8, linestyle=(0, (1, 1.2)))
             label = f"{percent(found.level)} band of interception"
-            line = Line2D([], [], color="black", linewidth=0.8, linestyle=(0, (1, 1.2)), label=label)
+            line = Line2D([], [], color=ink(), linewidth=0.8, linestyle=(0, (1, 1.2)), label=label)
             handles.append(line)
         above(ax, handles)
         ax.set_ylim(0.0, 1.0)
@@ -132,7 +133,7 @@ def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, s
         The axes drawn in.
     """
     ax = new_axes(ax, COLUMN, 0.65 + _ROW * len(found.names))
-    ax.axvline(0.0, color="0.5", linewidth=0.8, linestyle=(0, (4, 2.5)), zorder=1.5)
+    ax.axvline(0.0, color=ink(0.5), linewidth=0.8, linestyle=(0, (4, 2.5)), zorder=1.5)
     rows = zip(found.names, found.difference, found.low, found.high, strict=True)
     for row, (name, d, low, high) in enumerate(rows):
         it = outcome_look(name)
@@ -140,7 +141,7 @@ def comparison(found: Comparison, ax: Axes | None = None, *, names: tuple[str, s
         sure = low > 0.0 or high < 0.0
         ax.plot(
             [d], [row], marker=it.marker, markersize=5.5, markeredgecolor=it.colour, zorder=3.5,
-            markerfacecolor=it.colour if sure else "white", linestyle="none",
+            markerfacecolor=it.colour if sure else paper(), linestyle="none",
         )  # fmt: skip
     _rows(ax, [outcome_look(name).label for name in found.names])
     reach = 1.12 * float(max(np.abs(found.low).max(), np.abs(found.high).max())) or 1.0  # nothing differs: any range
@@ -204,13 +205,13 @@ def radius_curve(
         ax.fill_between(at, low, high, color=it.colour, alpha=0.25, linewidth=0)
         ax.plot(
             at, line, color=it.colour, linestyle=it.dashes, marker=it.marker, markersize=3.2,
-            markerfacecolor="white", markeredgewidth=0.8, markevery=max(len(at) // 12, 1),
+            markerfacecolor=paper(), markeredgewidth=0.8, markevery=max(len(at) // 12, 1),
         )  # fmt: skip
         ends.append((float(line[-1]), it.label, it.colour))
     if values[0] <= curve.reference <= values[-1]:
-        ax.axvline(curve.reference, color="0.45", linewidth=0.7, linestyle=(0, (4, 2.5)), zorder=1.2)
+        ax.axvline(curve.reference, color=ink(0.45), linewidth=0.7, linestyle=(0, (4, 2.5)), zorder=1.2)
     if quantity != "probability":
-        ax.axhline(0.0, color="0.45", linewidth=0.6, zorder=1.2)
+        ax.axhline(0.0, color=ink(0.45), linewidth=0.6, zorder=1.2)
     ylabel = {
         "probability": "probability",
         "difference": f"$P - P(\\mathrm{{{'reference'}}})$",
@@ -264,7 +265,7 @@ def sensitivity(found: Sensitivity, output: str | None = None, ax: Axes | None =
             _interval(ax, row + offset, low[i], high[i])
         handles.append(Patch(label=label, **box))
     _rows(ax, [input_label(found.inputs[i]) for i in order])
-    ax.axvline(0.0, color="0.25", linewidth=0.6)
+    ax.axvline(0.0, color=ink(0.25), linewidth=0.6)
     what = quantity_label(name)
     ax.set_xlabel(f"share of the variance{' ' if len(what) < 20 else chr(10)}of {what}")  # a narrow figure has no more
     above(ax, handles)
@@ -273,7 +274,7 @@ def sensitivity(found: Sensitivity, output: str | None = None, ax: Axes | None =
 
 def _interval(ax: Axes, row: float, low: float, high: float) -> None:
     """A thin line from low to high with ends."""
-    ax.plot((low, high), (row, row), color="black", linewidth=1.0, marker="|", markersize=5, zorder=3.0)
+    ax.plot((low, high), (row, row), color=ink(), linewidth=1.0, marker="|", markersize=5, zorder=3.0)
 
 
 def _rows(ax: Axes, labels: Sequence[str]) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import colour_bar, new_axes
+from tadcore.plotting.tools.ground import ink
 from tadcore.plotting.tools.outcomes import input_label, listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.statistics import TrialOutcomes, outcome_names
@@ -80,7 +81,7 @@ def outcomes_over(
     ended = indicators(result.kind, result.defender, result.scenario.n, lost)[names.index(outcome), finite]
     share, edges_x, edges_y = _shares(points, ended, many, max(least, 1))
     ax = new_axes(ax, COLUMN, 2.6)
-    ax.set_facecolor("0.93")
+    ax.set_facecolor(ink(0.93))
     image = ax.pcolormesh(edges_x, edges_y, share.T, cmap="cividis", vmin=0.0, vmax=1.0, rasterized=True)
     if legend:
         colour_bar(ax, image, f"share of trials: {outcome_look(outcome).label}")

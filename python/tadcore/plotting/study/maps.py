@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import above, colour_bar, new_axes
+from tadcore.plotting.tools.ground import ink
 from tadcore.plotting.tools.labels import Labels
 from tadcore.plotting.tools.outcomes import boxes, listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN, PAGE, look, symbol
@@ -179,7 +180,7 @@ def draw_players(ax: Axes, found: OverStarts, extent: Extent, *, radii: bool, da
             markerfacecolor="white" if varies else it.colour, markeredgecolor=it.colour if varies else edge,
         )  # fmt: skip
         labels.avoid_spot(at, 5.0)
-        labels.add(at, it.symbol, color="black", leader_from=14.0)
+        labels.add(at, it.symbol, color=ink(), leader_from=14.0)
         if not radii or varies:
             continue
         if player in reach:

@@ -9,6 +9,7 @@ import numpy as np
 from tadcore._shared.calls import public
 from tadcore.plotting.tools.axes import new_axes
 from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.ground import paper
 from tadcore.plotting.tools.outcomes import listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN, look
 from tadcore.statistics.radii import RadiusCurves
@@ -57,7 +58,7 @@ def radius_curves(curves: RadiusCurves, ax: Axes | None = None, *, outcome: str 
             at, curve.band_low[i][finite], curve.band_high[i][finite], color=it.colour, alpha=0.15, linewidth=0
         )
         ax.plot(
-            at, share, color=it.colour, linestyle=it.dashes, marker=it.marker, markersize=3.2, markerfacecolor="white",
+            at, share, color=it.colour, linestyle=it.dashes, marker=it.marker, markersize=3.2, markerfacecolor=paper(),
             markeredgewidth=0.8, markevery=max(len(at) // 12, 1),
         )  # fmt: skip
         if at[0] <= curve.reference <= at[-1]:

@@ -13,6 +13,7 @@ from tadcore._shared.calls import public
 from tadcore.errors import ScenarioError
 from tadcore.plotting.tools.axes import above, colour_bar, new_axes
 from tadcore.plotting.tools.ends import label_ends
+from tadcore.plotting.tools.ground import paper
 from tadcore.plotting.tools.outcomes import boxes, input_label, listed, outcome_look
 from tadcore.plotting.tools.style import COLUMN
 from tadcore.scenario.paths import short
@@ -99,7 +100,7 @@ def _lines(found: Swept, made: xarray.Dataset, ax: Axes | None, outcomes: list[s
         ax.vlines(at, low, high, color=it.colour, linewidth=0.7, alpha=0.8)
         ax.plot(
             at, line, color=it.colour, linestyle=it.dashes if numbers is not None else "none", marker=it.marker,
-            markersize=3.4, markerfacecolor="white", markeredgewidth=0.8,
+            markersize=3.4, markerfacecolor=paper(), markeredgewidth=0.8,
         )  # fmt: skip
         there = np.flatnonzero(np.isfinite(line))
         if there.size and numbers is not None:
@@ -171,7 +172,7 @@ def _marks(outcomes: Sequence[str]) -> list[Any]:
 
     looks = [outcome_look(name) for name in outcomes]
     return [
-        Line2D([], [], color=it.colour, linestyle="none", marker=it.marker, markersize=3.4, markerfacecolor="white",
+        Line2D([], [], color=it.colour, linestyle="none", marker=it.marker, markersize=3.4, markerfacecolor=paper(),
                label=it.label)
         for it in looks
     ]  # fmt: skip

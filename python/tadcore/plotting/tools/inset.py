@@ -10,6 +10,8 @@ from matplotlib.patches import Rectangle
 
 from tadcore._shared.arrays import Floats
 
+from .ground import ink
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -73,9 +75,9 @@ def _frame(ax: Axes, inset: Axes, crowded: Floats, width: float, height: float, 
     inset.set_aspect("equal")
     inset.patch.set_alpha(0.9)
     for spine in inset.spines.values():
-        spine.set(color="0.5", linewidth=0.6)
+        spine.set(color=ink(0.5), linewidth=0.6)
     corner = (x - width / 2, y - height / 2)
-    ax.add_patch(Rectangle(corner, width, height, fill=False, edgecolor="0.5", linewidth=0.6, zorder=3.3))
+    ax.add_patch(Rectangle(corner, width, height, fill=False, edgecolor=ink(0.5), linewidth=0.6, zorder=3.3))
 
 
 def _inches(ax: Axes) -> tuple[float, float]:

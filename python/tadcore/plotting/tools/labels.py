@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats
 
+from .ground import ink, paper
 from .style import points
 
 if TYPE_CHECKING:
@@ -64,10 +65,10 @@ class Labels(Artist):
         A label further from its point than ``leader_from`` typographic points is tied to it by a line.
         """
         point = np.asarray(anchor, dtype=float)
-        leader = Line2D([], [], color="0.35", linewidth=0.5, zorder=3.4, transform=IdentityTransform())
+        leader = Line2D([], [], color=ink(0.35), linewidth=0.5, zorder=3.4, transform=IdentityTransform())
         style.setdefault("zorder", 4.5)
         printed = Text(0.0, 0.0, text, ha="center", va="center", transform=IdentityTransform(), **style)
-        printed.set_bbox({"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none", "alpha": 0.65})
+        printed.set_bbox({"boxstyle": "square,pad=0.05", "facecolor": paper(), "edgecolor": "none", "alpha": 0.65})
         for artist in (leader, printed):
             artist.set_in_layout(False)
             artist.set_clip_on(False)

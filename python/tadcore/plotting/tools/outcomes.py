@@ -17,6 +17,7 @@ from tadcore._shared.arrays import Floats
 from tadcore.scenario.paths import short
 from tadcore.statistics.outcomes import is_defender
 
+from .ground import ink
 from .style import look, symbol
 
 if TYPE_CHECKING:
@@ -47,12 +48,12 @@ def outcome_look(name: str) -> OutcomeLook:
     if name == "no_equilibrium":
         return OutcomeLook("no equilibrium", "#1F78B4", (0.85, 0.9, 0.95), "**", "s", (0, (3, 1, 1, 1)))
     if name == "timeout":
-        return OutcomeLook("timeout", "#666666", (0.97, 0.97, 0.97), "", "v", (0, (1, 2.5)))
+        return OutcomeLook("timeout", ink(0.4), (0.97, 0.97, 0.97), "", "v", (0, (1, 2.5)))
     if name == "captured":
         who = look("attacker")
         return OutcomeLook("captured", who.colour, _tint(who.colour, 0.12), r"\\\\", who.marker, who.dashes)
     if name == "intercepted":
-        return OutcomeLook("intercepted", "#000000", (0.75, 0.75, 0.75), "", "o", "-")
+        return OutcomeLook("intercepted", ink(), (0.75, 0.75, 0.75), "", "o", "-")
     who, i = look(name), int(name.removeprefix("d")) - 1
     fill = _tint(who.colour, _LIGHT[i % len(_LIGHT)])
     return OutcomeLook(f"by {who.symbol}", who.colour, fill, _HATCHES[i % len(_HATCHES)], who.marker, who.dashes)

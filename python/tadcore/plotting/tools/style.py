@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from tadcore._shared.arrays import as_flag
 from tadcore.game.recorded import Recorded
+
+from .ground import ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,6 +63,16 @@ _PAPER: Any = {
 }
 
 
+_GROUND = "#14171c"
+_DARK: Any = {
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _GROUND),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.titlecolor", "xtick.color", "ytick.color"), "0.92"),
+    "axes.edgecolor": "0.75",
+    "grid.color": "0.25",
+    "hatch.color": "0.1",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Look:
     """The appearance of one player."""
@@ -84,7 +97,7 @@ def look(player: str) -> Look:
     """Return how the player labelled ``player`` ("d1", …, "target", "attacker") is drawn."""
     text = f"${symbol(player)}$"
     if player == "target":
-        return Look(text, "#000000", "*", (0, (8, 2)))
+        return Look(text, ink(), "*", (0, (8, 2)))
     if player == "attacker":
         return Look(text, "#D55E00", "X", (0, (2, 1)))
     i = int(player.removeprefix("d")) - 1
@@ -129,13 +142,20 @@ def world_text(run: Recorded) -> str:
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def style(*, dark: bool = False) -> Iterator[None]:
     """Set type and line weights as a two-column journal prints them, inside a ``with`` block only.
 
     Every function of this package draws in whatever style is in force, so this is for the reader who wants the look of
     the bundled figures. Draw and save inside the block: ticks take their font when they are first drawn.
+
+    Parameters
+    ----------
+    dark : bool
+        Whether to draw on a dark ground, for slides. What is black on white is then white; so it is in any style with
+        dark axes, such as Matplotlib's ``dark_background``.
     """
-    with contextlib.ExitStack() as last, mpl.rc_context(_PAPER):
+    chosen = {**_PAPER, **_DARK} if as_flag("dark", dark) else _PAPER
+    with contextlib.ExitStack() as last, mpl.rc_context(chosen):
         try:
             yield
         finally:
@@ -165,7 +185,7 @@ def note(ax: Axes, text: str) -> None:
         ha="center",
         va="top",
         fontsize="x-small",
-        color="0.3",
+        color=ink(0.3),
         annotation_clip=False,
         gid=_NOTE,
     )
