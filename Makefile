@@ -148,7 +148,7 @@ docs: setup  ## build the documentation, every code cell executed, and the core'
 	RUSTDOCFLAGS="$(RUSTDOC)" cargo doc --workspace --no-deps --locked
 	$(LISTED) docs | $(PIP) --requirement /dev/stdin
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
-	$(BIN)/python docs/check_links.py docs/_build/html
+	$(BIN)/python docs/check_pages.py docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
 # On Linux zig links against the glibc of 2012, so that the wheel runs wherever NumPy's does; plain rustc would ask for

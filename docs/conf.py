@@ -1,5 +1,8 @@
 """Sphinx: how the documentation is built. Every code cell is executed; a cell that raises stops the build."""
 
+import os
+from pathlib import Path
+
 import tadcore
 
 project = "tadcore"
@@ -29,6 +32,8 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
+nb_render_image_options = {"width": "660px"}
+os.environ["MATPLOTLIBRC"] = str(Path(__file__).parent)  # kernels draw with twice as many pixels
 
 default_role = "py:obj"
 autodoc_member_order = "bysource"

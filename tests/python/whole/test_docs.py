@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+import struct
 import subprocess
 import sys
 import types
@@ -138,10 +139,43 @@ def test_relative_links_and_pictures_exist():
             assert (page.parent / path).exists(), f"{page.name}: {path}"
 
 
+def check_pages(folder):
+    command = [sys.executable, str(DOCS / "check_pages.py"), str(folder)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_built_pages_are_read_for_what_no_cell_should_print(tmp_path):
+    def png(name, width):
+        (tmp_path / name).write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", width, 10))
+
+    png("wide.png", 1400)
+    png("small.png", 500)
+    cell = '<div class="cell_output docutils container">{}</div>'
+    good = cell.format("<pre>d1 at t = 1.395, see https://x.y/work/z</pre>") + "<pre>ls /home/you; Warning: mine</pre>"
+    (tmp_path / "a.html").write_text(good + cell.format('<img src="wide.png" style="width: 660px;">'))
+    assert check_pages(tmp_path).returncode == 0
+    bad = [
+        "<pre>/work/main/x.py: gone</pre>",
+        '<div class="output stderr highlight"><pre>TqdmWarning</pre></div>',
+        "<pre>UserWarning: beware</pre>",
+        '<img src="small.png">',
+        '<img src="wide.png" style="width: 300px;">',
+    ]
+    (tmp_path / "a.html").write_text("".join(map(cell.format, bad)))
+    done = check_pages(tmp_path)
+    assert done.returncode == 1
+    assert done.stdout.splitlines() == [
+        "a.html: on standard error: TqdmWarning",
+        "a.html: a path of this machine: /work/main",
+        "a.html: a warning: UserWarning: beware",
+        "a.html: small.png has 500 pixels, shown as wide as they are",
+        "a.html: wide.png has 1400 pixels, shown 300",
+    ]
+
+
 def test_the_link_checker_finds_what_leads_nowhere(tmp_path):
     def check():
-        command = [sys.executable, str(DOCS / "check_links.py"), str(tmp_path)]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        return check_pages(tmp_path)
 
     assert (check().returncode, check().stdout) == (1, f"{tmp_path}: no pages\n")
     (tmp_path / "a.html").write_text('<h1 id="top"></h1><a href="b.html#here">b</a><a href="https://x.y/">x</a>')
