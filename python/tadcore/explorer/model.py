@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
-from tadcore.errors import ScenarioError
+from tadcore.errors import ScenarioError, TadcoreError
 from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.scenario.model import Scenario
+from tadcore.simulation.hooks import as_trial
 from tadcore.simulation.play import simulate
 
 MOST_POINTS = 400
@@ -41,6 +43,7 @@ class Explorer:
 
     def __init__(self, sc: Scenario) -> None:
         self.scenario = sc
+        self.trial = 0
         self.run: Recorded = until_divergence(simulate(sc))
         self.time = self.run.outcome.time
         self.plane = (0, 1)
@@ -63,15 +66,28 @@ class Explorer:
             raise ScenarioError("player", player, f"one of {', '.join(self.scenario.players)}")
         place = self.scenario.positions[self.scenario.players.index(player)].copy()
         place[list(self.plane)] = x, y
-        self._change(f"{player}.position", tuple(place.tolist()), preview=preview)
+        self._change({f"{player}.position": tuple(place.tolist())}, preview=preview)
 
     def see(self, player: str, radius: float, *, preview: bool = False) -> None:
         """Give a player another visibility radius; inf for unlimited."""
-        self._change(f"{player}.visibility_radius", float(radius), preview=preview)
+        self._change({f"{player}.visibility_radius": float(radius)}, preview=preview)
 
     def capture(self, player: str, radius: float) -> None:
         """Give a player another capture radius."""
-        self._change(f"{player}.capture_radius", float(radius))
+        self._change({f"{player}.capture_radius": float(radius)})
+
+    def surround(self, tables: Mapping[str, object]) -> None:
+        """Give the scenario other common tables of what surrounds the game; None takes one out."""
+        self._change(tables)
+
+    def draw(self, trial: int) -> None:
+        """Play another trial of failures and disturbances."""
+        before, self.trial = self.trial, as_trial("trial", trial)
+        try:
+            self._play(self.scenario, self.scenario, preview=False)
+        except TadcoreError:
+            self.trial = before
+            raise
 
     def stretch(self, player: str, x: float, y: float, *, preview: bool = False) -> None:
         """Give a player the visibility radius whose disc, around where it stands now, passes through a point."""
@@ -138,14 +154,14 @@ class Explorer:
             figure.savefig(picture, format="png", dpi=300)
         return picture.getvalue()
 
-    def _change(self, field: str, value: object, *, preview: bool = False) -> None:
-        scenario = self.scenario.replace({field: value})
+    def _change(self, changes: Mapping[str, object], *, preview: bool = False) -> None:
+        scenario = self.scenario.replace(changes)
         coarse = self.coarse_step if preview else scenario.step
         self._play(scenario, scenario.replace({"step": coarse}), preview=coarse != scenario.step)
 
     def _play(self, scenario: Scenario, played: Scenario, *, preview: bool) -> None:
         at_end = math.isclose(self.time, self.run.outcome.time)
-        self.run = until_divergence(simulate(played))
+        self.run = until_divergence(simulate(played, trial=self.trial))
         self.scenario, self.preview = scenario, preview
         self.look_at(self.run.outcome.time if at_end else self.time)
 

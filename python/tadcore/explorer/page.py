@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from tadcore.plotting.run.raster import bars_of
 from .figures import arena, controls, edge_name, frame, instant, plain, theta, timeline
 from .model import Explorer
 from .pointer import Pointer
+from .surroundings import Surroundings, tables_of
 
 if TYPE_CHECKING:
     from bokeh.document import Document
@@ -63,6 +64,11 @@ class Page:
             controls(self.sources, explorer.scenario, self.marks[2]),
         ]
         self._sliders = self._make_sliders()
+        self._around = Surroundings(explorer.scenario, self._surround)
+        self.trial = Slider(
+            start=0, end=99, step=1, value=0, title="trial", width=230, visible=explorer.scenario.is_random
+        )
+        self.trial.on_change("value", lambda attribute, old, new: self._draw(int(new)))
         self._listen()
         self.show_instant()
 
@@ -78,7 +84,7 @@ class Page:
         hint = Div(text="Drag a player's start, or the rim of its visibility disc (the small diamond).")
         left = column(self.status, self.planes, self.arena, self.time, hint, save)
         *upper, effort = self.plots
-        return row(left, column(*upper, self.traces, effort), column(*self._sliders))
+        return row(left, column(*upper, self.traces, effort), column(*self._sliders, self.trial, *self._around.rows))
 
     def change(self, action: Callable[[], None]) -> bool:
         """Do something that plays the game again; show the new game, or why there is none."""
@@ -270,6 +276,16 @@ class Page:
     def _slide_capture(self, player: str, radius: float) -> None:
         if not self._quiet:
             self._slid(lambda: self.explorer.capture(player, radius))
+
+    def _surround(self, values: Mapping[str, float]) -> None:
+        sc = self.explorer.scenario
+        if not self.change(lambda: self.explorer.surround(tables_of(sc, values))):
+            self._around.show(sc)
+        self.trial.visible = self.explorer.scenario.is_random
+
+    def _draw(self, trial: int) -> None:
+        if not self.change(lambda: self.explorer.draw(trial)):
+            self.trial.value = self.explorer.trial
 
     def _slid(self, action: Callable[[], None]) -> None:
         """Do what a slider says; one whose value is refused goes back to what is played."""
