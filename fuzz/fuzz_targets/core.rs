@@ -9,9 +9,8 @@ use tadcore::cost::costs;
 use tadcore::ensemble::{self, Batch, Between, End};
 use tadcore::error::{EquilibriumError, RunError};
 use tadcore::game::{Game, Grid, Interaction, Weights};
-use tadcore::network::EdgeRule;
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
-use tadcore::simulation::{Outcome, Setup, Termination, simulate, simulate_with};
+use tadcore::simulation::{Outcome, Rules, Setup, Termination, simulate, simulate_with};
 
 /// What the bytes say; nothing of it is checked before the core sees it.
 #[derive(Debug, Arbitrary)]
@@ -132,7 +131,8 @@ fuzz_target!(|input: Input| {
     let numbers = record.passes.iter().flat_map(|pass| [pass.enters, pass.closest, pass.distance]);
     assert!(numbers.into_iter().all(|x| x.is_finite() && x >= 0.0), "a pass is not finite");
     for termination in [Termination::Sampled, Termination::Continuous] {
-        let one = simulate_with(&policy, &setup, &EdgeRule::PAPER, termination, &cancel).expect("a run");
+        let rules = Rules { termination, ..Rules::default() };
+        let one = simulate_with(&policy, &setup, rules, &cancel).expect("a run");
         let ends = ensemble::run_with(&policy, &batch, Between { termination, passes: true }, None, Some(1), &cancel);
         let end = End { passed: !one.passes.is_empty(), ..End::from(&one) };
         assert_eq!(ends.as_deref(), Ok(&[end][..]), "the batch passes or ends otherwise");
