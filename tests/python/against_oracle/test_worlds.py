@@ -6,7 +6,7 @@ import pytest
 import tadcore
 from oracle import chains
 from oracle.scenario import as_mapping
-from oracle.stepping import Gains, simulate
+from oracle.stepping import Gains, Remembering, simulate
 from oracle.worlds import Course
 from samples import random_game, random_start
 from world_samples import changes_of, random_world
@@ -27,17 +27,13 @@ def drawn_game(seed, *, steps=30, **parts):
     return game, start, world, sc, key
 
 
-def play(game, start, world, key):
+def play(game, start, world, key, look=None):
     course = Course(world, game, start.positions.shape[1], **key)
-    return simulate(game, start, Gains(game, few=1, many=6), course=course), course
+    return simulate(game, start, Gains(game, few=1, many=6), look, course=course), course
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_a_random_game_is_the_oracles(seed):
-    game, start, world, sc, key = drawn_game(seed)
-    expected, course = play(game, start, world, key)
-    assert expected.margin > CLOSE
-    run = tadcore.simulate(sc, **key)
+def compare(run, expected, game):
+    """Outcome, time, networks, what is seen and positions of a run against those of the oracle."""
     assert (run.outcome.kind, run.outcome.defender) == (expected.kind, expected.defender)
     assert run.outcome.time == pytest.approx(expected.time, abs=1e-9)
     L = expected.step
@@ -49,6 +45,16 @@ def test_a_random_game_is_the_oracles(seed):
         assert [c.time for c in run.network_changes] == pytest.approx([k * game.step for k in changes], abs=1e-9)
     scale = 1 + np.max(np.abs(expected.positions))
     assert np.max(np.abs(run.position - np.array(expected.positions))) <= 1e-7 * scale
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_random_game_is_the_oracles(seed):
+    game, start, world, sc, key = drawn_game(seed)
+    expected, course = play(game, start, world, key)
+    assert expected.margin > CLOSE
+    run = tadcore.simulate(sc, **key)
+    compare(run, expected, game)
+    L = expected.step
     if run.course is None:
         assert sc.world is None
         return
@@ -58,6 +64,19 @@ def test_a_random_game_is_the_oracles(seed):
         assert np.array_equal(run.course.heard[k], course.heard(k, expected.positions[k]))
         assert run.course.displacement[k] == pytest.approx(course.shock(k), rel=1e-13, abs=1e-300)
     assert not run.course.displacement[-1].any()
+
+
+@pytest.mark.parametrize("seed", [pytest.param(s, marks=[pytest.mark.heavy] * (s >= 6)) for s in range(30)])
+def test_edges_with_a_memory_are_the_oracles(seed):
+    """Hysteresis, in every second game a dwell time: the memory is of sight alone, before what fails and is told."""
+    game, start, world, sc, key = drawn_game(100 + seed)
+    rule = {"hysteresis": 0.1 + 0.05 * (seed % 5), "dwell": 3 * game.step * (seed % 2)}
+    expected, _ = play(game, start, world, key, Remembering(start.zeta, *rule.values(), game.step))
+    assert expected.margin > CLOSE
+    run = tadcore.simulate(sc, **rule, **key)
+    if run.course is None:  # nothing surrounds this game: what is seen is used
+        expected.seen = expected.networks
+    compare(run, expected, game)
 
 
 @pytest.mark.parametrize("seed", range(100))

@@ -127,8 +127,9 @@ def simulate(game, start, gains=None, look=None, course=None):
             A, seen = course.network(k, positions, start.zeta, sight=A)
             run.seen.append(seen)
             run.margin = min(run.margin, margin(course.world, positions, game.m))
-        gap = np.abs(distances(positions)[: game.m] - start.zeta[:, None])
-        run.margin = min(run.margin, np.min(gap[np.isfinite(gap)], initial=np.inf))
+        for reach in (start.zeta, start.zeta + getattr(look, "band", 0.0)):
+            gap = np.abs(distances(positions)[: game.m] - reach[:, None])
+            run.margin = min(run.margin, np.min(gap[np.isfinite(gap)], initial=np.inf))
         if not run.networks or np.any(run.networks[-1] != A):
             run.changes.append((k, A))
         found, rows = gains.loop(k, A)
