@@ -245,7 +245,7 @@ def test_a_function_is_handed_what_is_seen_and_not_what_is_told():
     ],
 )
 def test_an_answer_that_is_no_network_is_refused_by_name(answer):
-    with pytest.raises((ScenarioError, TypeError, ValueError), match="network"):
+    with pytest.raises(ScenarioError, match=r"^network: got .* at t = 0.*, must be .*a bool array of shape \(3, 4\)"):
         tadcore.simulate(I1, network=lambda *_: answer)
 
 
@@ -258,8 +258,9 @@ def test_what_the_function_raises_ends_the_run():
             raise OwnError("at twenty")
         return np.zeros((3, 4), dtype=bool)
 
-    with pytest.raises(OwnError, match="at twenty"):
+    with pytest.raises(OwnError, match="at twenty") as caught:
         tadcore.simulate(I1, network=fails)
+    assert caught.value.__notes__ == ["raised by network= at step 20, t = 0.1"]
     with pytest.raises(ScenarioError, match=r"network: .*a function"):
         tadcore.simulate(I1, network=3)
 
@@ -308,13 +309,14 @@ def test_links_nearer_than_rounding_are_refused_in_batches():
 # ---- laws
 
 
-def test_more_knowledge_never_raises_theta():
+@pytest.mark.parametrize("pairs", [120, pytest.param(50_000, marks=pytest.mark.heavy)])
+def test_more_knowledge_never_raises_theta(pairs):
     """Θ*(𝒜) ≥ Θ*(relay 𝒜), since the gains that 𝒜 allows are among those of its relay."""
     rng = np.random.default_rng(61)
     strict = 0
     for sc in (I1, I2):
         m, N = len(sc.constrained), sc.n + 1
-        for _ in range(120):
+        for _ in range(pairs):
             seen = from_number(int(rng.integers(2 ** (m * N))), m, N)
             heard = (rng.random((m, m)) < rng.random()) & ~np.eye(m, dtype=bool)
             told = relay(seen, heard, [None, 0, 1][rng.integers(3)], bool(rng.integers(2)))
@@ -322,7 +324,7 @@ def test_more_knowledge_never_raises_theta():
             less, more = (tadcore.synthesize(sc, step=step, adjacency=A).theta for A in (seen, told))
             assert more <= less * (1 + 1e-9) + 1e-12
             strict += more < 0.99 * less
-    assert strict > 60
+    assert strict > pairs / 2
 
 
 @pytest.mark.parametrize(("interaction", "dim"), [("I1", 2), ("I1", 3), ("I2", 2), ("I2", 3)])
@@ -406,7 +408,5 @@ def test_the_fields_of_feedback_and_criterion_reach_the_game():
     assert np.allclose(P, expected, rtol=1e-9)
     for sc in (ahead, I1.replace(criterion="component")):
         assert tadcore.simulate_batch(sc, [sc.positions])[0] == tadcore.simulate(sc).outcome
-        with pytest.raises(ScenarioError, match="receding horizon or the team criterion"):
-            tadcore.verify(sc)
         with pytest.raises(ScenarioError, match=r"tadcore.sweep"):
             tadcore.Study(sc, {"attacker.control_weight": [1.0, 1.1]}, trials=2)

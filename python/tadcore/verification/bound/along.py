@@ -9,6 +9,7 @@ import numpy as np
 from tadcore._shared.arrays import Floats
 from tadcore._shared.progress import bar
 from tadcore.simulation.run import Run
+from tadcore.verification.oracle.criterion import held
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 
@@ -52,7 +53,7 @@ class AlongRun:
         return (
             f"share of instants whose Θ is proved to be the lowest among scalar gains, to 1e-6: {self.proved} of "
             f"{self.instants}, {tried - self.proved} open, {self.instants - tried} not tried (more than {MOST} "
-            "unknowns that do not decouple)"
+            "unknowns that do not decouple, or rows that are held at the equilibrium)"
         )
 
 
@@ -79,7 +80,8 @@ def bound_along(run: Run, values: Floats, *, progress: bool = True) -> AlongRun:
         objective = FullObjective(sc, m, values[:, k], adjacency, dim=1)
         if network not in groups:
             groups[network] = largest_group(objective)
-        if groups[network] <= MOST:
+        # Θ over all rows may lie below that under the team criterion, and proves nothing of it.
+        if groups[network] <= MOST and not held(sc, adjacency).any():
             found[k] = prove_theta(objective, run.gains[k], near.get(network), deep=True)
             near[network] = found[k].proof
     return AlongRun(found, length)

@@ -10,6 +10,7 @@ from tadcore.errors import TadcoreError
 from tadcore.game.synthesis import synthesize
 from tadcore.simulation.play import simulate
 from tadcore.simulation.run import Run
+from tadcore.verification.oracle.criterion import chosen
 from tadcore.verification.oracle.optimality import CRITICAL, Optimality
 from tadcore.verification.report import Check
 
@@ -23,7 +24,7 @@ _EDGE = 1e-9
 def check_certified(run: Run, found: Optimality) -> Check:
     """By how many rows the recorded number of proofs is off, beyond those that rounding decides."""
     unknown = np.isnan(found.certificate)
-    blind = ~run.adjacency.any(axis=(1, 2))  # nothing to choose: proved
+    blind = ~chosen(run.scenario, run.adjacency).any(axis=(1, 2))  # nothing to choose: proved
     proved = int(np.sum(((found.gradient <= CRITICAL) & (found.certificate > _EDGE)) | blind))
     possible = int(np.sum(unknown | (found.certificate >= -_EDGE)))
     off = max(proved - run.certified, run.certified - possible, 0)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tadcore._shared.arrays import Floats
 from tadcore.game.synthesis import synthesize, theta_terms
 from tadcore.simulation.run import Run
+from tadcore.verification.oracle.criterion import held
 from tadcore.verification.oracle.matrices import FeedbackSolution, stacked_rows
 from tadcore.verification.report import Check, Measurement, VerificationReport
 
@@ -51,6 +53,19 @@ def index_distance(run: Run) -> xarray.Dataset:
         },
         coords={"time": run.times, "name": list(theta_terms(run.scenario.interaction))},
     )
+
+
+def _team(run: Run, own: Floats, scale: float) -> Check:
+    """How far the rows of players that know everything are from the equilibrium, under the team criterion."""
+    length = len(own[: len(run.times) - 1])
+    whole = held(run.scenario, run.adjacency[:length])
+    off = np.where(whole, np.abs(run.gains[:length] - own[:length]).max(axis=2), 0.0) / scale
+    k, i = np.unravel_index(int(np.argmax(off)), off.shape)
+    remedy = "who knows everything must play its row of the equilibrium: the paper's criterion was used"
+    where = f"{np.count_nonzero(whole)} rows" + (
+        f", {run.scenario.players[i]} at t = {run.times[k]:.6g}" if off[k, i] else ""
+    )
+    return Check("consistency.team", float(off[k, i]), _ROWS, run.converged, remedy, _SOURCE, where)
 
 
 def check_consistency(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
@@ -103,12 +118,20 @@ def check_consistency(run: Run, equilibrium: FeedbackSolution) -> VerificationRe
             Check("consistency.run.theta", least, _THETA, run.converged, remedy, _SOURCE, where),
             Check("consistency.run.control", control, _ROWS, run.converged, remedy, _SOURCE, where),
         ]
-    else:
+    elif sc.criterion != "component":
         notes.append("in this run nowhere does everyone see everyone: consistency is checked off the run only")
+    if sc.criterion == "component":
+        checks.append(_team(run, own, scale))
     limited = np.setdiff1d(np.arange(length), full)
     if len(limited):
         mean = float(run.theta[limited].mean())
         measured.append(Measurement("consistency.theta.mean", mean, "mean Θ where someone does not see someone"))
+        price = run.theta_price
+        k = int(np.argmax(price))
+        meaning = (
+            f"mean Θ under the team criterion less Θ under the paper's, there; {price[k]:.6g} at t = {run.times[k]:.6g}"
+        )
+        measured.append(Measurement("consistency.price.mean", float(price[limited].mean()), meaning))
         for name, values in zip(theta_terms(sc.interaction), run.theta_terms[limited].T, strict=True):
             measured.append(
                 Measurement(f"consistency.{name}.mean", float(values.mean()), f"mean ‖{name}‖², unweighted")

@@ -8,7 +8,8 @@ the start is the game and the clock, that is P(t).
 A round gives each player a turn: read the mailbox, take one step, and send the row if it moved. With ``delay`` = d a
 row sent in round s is read from round s + d on, and everyone steps on what it has: rows are then up to d rounds old.
 A player that no longer moves tries its row reversed, on its own, and takes it where that ends lower: many minima differ
-by the sign of a row. The protocol ends when nobody has moved for d + 1 rounds.
+by the sign of a row. The protocol ends when nobody has moved for d + 1 rounds. Under the team criterion a player that
+knows everything sends its row of the equilibrium, and stays there.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from tadcore.game.synthesis import synthesize
 from tadcore.scenario.model import Scenario
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.run import Run
+from tadcore.verification.oracle.criterion import held
 from tadcore.verification.oracle.matrices import Matrices, matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.report import Check, Measurement, VerificationReport
@@ -102,17 +104,18 @@ class _Player:
         self.basis = self.objective.rows(np.eye(self.objective.unknowns))
         wanted = -self.objective.BP[0][i] / m.r[i] * (1.0 if self.objective.first else -1.0)
         self.x = np.linalg.lstsq(self.basis[:, i].T, wanted, rcond=None)[0] if sees.any() else np.zeros(0)
+        self.fixed = m.rows(values)[i] if held(sc, sees) else None
         self.heard = np.zeros(shape)
 
     @property
     def row(self) -> Floats:
         """g_i, what is sent."""
-        own: Floats = self.objective.rows(self.x)[self.i]
+        own: Floats = self.objective.rows(self.x)[self.i] if self.fixed is None else self.fixed
         return own
 
     def step(self, method: str, damping: float) -> bool:
         """One step on what has been heard; whether the row moved."""
-        if not self.x.size:
+        if not self.x.size or self.fixed is not None:
             return False
         f = self.objective
         others = self.heard.copy()

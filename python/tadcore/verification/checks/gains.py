@@ -115,7 +115,7 @@ def check_gains(
     chosen = _instants(run, instants)
     flattest, lower, worst, where_lower = np.inf, 0.0, 0.0, 0
     for k in chosen:
-        objective = FullObjective(sc, m, values[:, k], run.adjacency[k])
+        objective = FullObjective(sc, m, values[:, k], run.adjacency[k], team=True)
         x = objective.blocks(run.gains[k])
         low, high = lowest_curvature(objective, x)
         if high > 0:
@@ -139,7 +139,7 @@ def check_gains(
         checks.append(Check("gains.multistart", worst, _LOWER, True, remedy, label, where))
     share = run.certified / len(run.times)
     measured = [Measurement("gains.certified", share, "share of rows whose gains are proved globally optimal")]
-    if bound == 1:
+    if bound == 1:  # over all rows: Θ under the team criterion lies above it, too
         bounds = [
             bound_theta(FullObjective(sc, m, values[:, k], run.adjacency[k], dim=1), float(run.theta[k]))
             for k in chosen.tolist()
@@ -248,7 +248,7 @@ def certificate_rates(sc: ScenarioLike, *, trials: int = 200, starts: int = 0, s
         rng = generator(seed, trial)
         k, adjacency = int(rng.integers(sc.steps + 1)), rng.random(shape) < rng.random()
         found = synthesize(sc, step=k, adjacency=adjacency)
-        objective = FullObjective(sc, m, values[:, k], adjacency)
+        objective = FullObjective(sc, m, values[:, k], adjacency, team=True)
         x = objective.blocks(found.rows)
         low, high = lowest_curvature(objective, x)
         best = multistart(objective, x, starts, rng)

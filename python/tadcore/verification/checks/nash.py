@@ -21,7 +21,8 @@ from tadcore.verification.oracle.responses import REGRET, BestResponse, best_res
 from tadcore.verification.report import Check, Measurement, VerificationReport, number
 
 _FEWEST, _MOST = 800, 6400
-_DEFECT, _TERMINAL, _FEEDBACK = 1e-10, 1e-14, 1e-12
+_DEFECT, _TERMINAL, _FEEDBACK, _RECEDING = 1e-10, 1e-14, 1e-12, 1e-9
+_COARSEST = 50
 
 
 def riccati_defect(sc: Scenario, equilibrium: FeedbackSolution) -> dict[str, Floats]:
@@ -69,9 +70,12 @@ def check_equilibrium(
     Returns
     -------
     VerificationReport
-        Riccati defect and terminal value, feedback rows, and the regret of each party relative to what it pays.
+        Riccati defect and terminal value, feedback rows, and the regret of each party relative to what it pays. With a
+        receding horizon all of that of the finite game up to the prediction horizon, and that P is its P(0) throughout.
     """
     eq = solve_equilibrium(sc) if equilibrium is None else equilibrium
+    if sc.feedback == "receding":
+        return _receding(sc, eq)
     refine = equilibrium is None if refine is None else refine
     m = matrices_of(sc)
     values = m.values(eq.P)
@@ -103,6 +107,32 @@ def check_equilibrium(
             Measurement(f"fne.J.{found.party}", found.cost, "cost of the equilibrium from this start, to T")
         )
     return VerificationReport(f"equilibrium of {sc!r}", tuple(checks), tuple(measured))
+
+
+def predicted(sc: Scenario) -> Scenario:
+    """The finite game up to the prediction horizon, whose P(0) a receding one plays throughout."""
+    ahead = sc.prediction_horizon or sc.horizon
+    steps = max(int(np.ceil(ahead / sc.step - 1e-9)), _COARSEST)
+    return sc.replace({"feedback": None, "prediction_horizon": None, "horizon": ahead, "step": ahead / steps})
+
+
+def _receding(sc: Scenario, eq: FeedbackSolution) -> VerificationReport:
+    """The checks of the finite game ahead, and P and the feedback at every instant against its beginning."""
+    finite, m = predicted(sc), matrices_of(sc)
+    ahead = solve_equilibrium(finite)
+    report = check_equilibrium(finite, ahead, refine=True)
+    values, first = m.values(eq.P), m.values(ahead.P)[:, :1]
+    rows, given = stacked_rows(eq.feedback, sc.players), m.rows(first)
+    parts = {
+        "fne.receding": (np.abs(values - first).max(axis=(2, 3)) / np.abs(first).max(axis=(2, 3))).max(axis=0),
+        "fne.receding.feedback": np.abs(rows - given).max(axis=(1, 2)) / np.maximum(np.abs(given).max(), 1e-300),
+    }
+    remedy = "at every instant P must be that at the beginning of a game as long as the prediction horizon"
+    checks = list(report)
+    for name, off in parts.items():
+        k = int(np.argmax(off))
+        checks.append(Check(name, float(off[k]), _RECEDING, True, remedy, "", f"t = {eq.times[k]:.6g}"))
+    return VerificationReport(f"equilibrium of {sc!r}", tuple(checks), report.measurements)
 
 
 def _responses(sc: Scenario, rows: Floats, *, refine: bool, followed: bool) -> tuple[BestResponse, ...]:

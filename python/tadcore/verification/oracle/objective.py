@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore.scenario.model import Scenario
 
+from .criterion import chosen, held
 from .matrices import Matrices
 
 
@@ -31,18 +32,31 @@ class FullObjective:
         𝒜.
     dim : int, optional
         Axes of the blocks; the scenario's by default, 1 for the reduced problem.
+    team : bool
+        Whether rows are held at the equilibrium where the scenario's criterion says so: they are no unknowns then.
     """
 
     def __init__(
-        self, sc: Scenario, m: Matrices, values: Floats, adjacency: NDArray[np.bool_], dim: int | None = None
+        self,
+        sc: Scenario,
+        m: Matrices,
+        values: Floats,
+        adjacency: NDArray[np.bool_],
+        dim: int | None = None,
+        *,
+        team: bool = False,
     ) -> None:
         self.dim = sc.dim if dim is None else dim
         self.first = sc.interaction == "I1"
         self.limited, self.size = adjacency.shape
-        self.seen = np.argwhere(adjacency)
+        self.seen = np.argwhere(chosen(sc, adjacency) if team else adjacency)
         self.unknowns = len(self.seen) * self.dim**2
         self.gamma = np.array(sc.synthesis_weights)
         eye = np.eye(self.dim)
+        fixed = np.zeros((self.limited, self.size))
+        if team:
+            fixed = np.where(held(sc, adjacency)[:, None], m.rows(values)[: self.limited], fixed)
+        self.fixed = np.kron(fixed, eye)
         self.R = np.repeat(m.r[: self.limited], self.dim)[:, None]
         P = [np.kron(p, eye) for p in (values if self.first else values[1:])]
         rows = self.limited * self.dim
@@ -55,7 +69,7 @@ class FullObjective:
         )
 
     def rows(self, x: Floats) -> Floats:
-        """G = K𝓘, shape (…, m·dim, N·dim), of blocks x with `unknowns` entries each."""
+        """G = K𝓘 without rows that are held, shape (…, m·dim, N·dim), of blocks x with `unknowns` entries each."""
         blocks = x.reshape(*x.shape[:-1], len(self.seen), self.dim, self.dim)
         G = np.zeros((*x.shape[:-1], self.limited, self.dim, self.size, self.dim))
         for s, (i, j) in enumerate(self.seen):
@@ -93,7 +107,7 @@ class FullObjective:
 
     def theta(self, x: Floats) -> float:
         """Θ over the number of axes."""
-        return self.theta_of(self.rows(x))
+        return self.theta_of(self.rows(x) + self.fixed)
 
     def theta_of(self, G: Floats) -> float:
         """Θ of joint rows G, over the number of axes."""
@@ -103,7 +117,7 @@ class FullObjective:
 
     def gradient(self, x: Floats) -> Floats:
         """∇Θ in the blocks (eq:errgradient), over the number of axes."""
-        return self.pull(self.inner(self.rows(x))) / self.dim
+        return self.pull(self.inner(self.rows(x) + self.fixed)) / self.dim
 
     def inner(self, G: Floats) -> Floats:
         """The gradient of Θ in G, before it is pulled back to the blocks."""
@@ -116,7 +130,7 @@ class FullObjective:
 
     def gradient_scale(self, x: Floats) -> float:
         """The size of the products that cancel in the gradient: what its rounding and its smallness are relative to."""
-        G = self.rows(x)
+        G = self.rows(x) + self.fixed
         S, _ = self.errors(G)
         norm = np.linalg.norm
         largest = float(norm(self.BP[0])) + float(norm(self.R * G))
@@ -128,7 +142,7 @@ class FullObjective:
 
     def hessian_product(self, x: Floats, v: Floats) -> Floats:
         """∇²Θ(x) v for directions v of shape (…, unknowns), exactly."""
-        return self.curve(self.rows(x), v)
+        return self.curve(self.rows(x) + self.fixed, v)
 
     def curve(self, G: Floats, v: Floats) -> Floats:
         """The same at joint rows G of any kind, for directions in the blocks."""

@@ -3,7 +3,8 @@
 The gains of row k are critical where the gradient of Θ in the unknowns that the network leaves vanishes
 (eq:errgradient). Write Θ = γ₁‖X‖² + a convex quadratic, with X = GᵀRG - M. Since ‖X‖² ≥ ‖X*‖² + 2⟨X*, X - X*⟩, a
 critical point is a *global* minimum among scalar gains where the form with blocks 4γ₁δ_ij r_i X* + Q_ij is positive
-semidefinite on those unknowns; Q is the Hessian of the quadratic part. Its smallest eigenvalue decides.
+semidefinite on those unknowns; Q is the Hessian of the quadratic part. Its smallest eigenvalue decides. Under the team
+criterion the rows that are held at the equilibrium are no unknowns, and the same holds over the others.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats
 from tadcore.scenario.model import Scenario
 
+from .criterion import chosen
 from .indices import adapted_weights
 from .matrices import Matrices
 
@@ -48,7 +50,7 @@ def optimality(sc: Scenario, m: Matrices, values: Floats, adjacency: NDArray[np.
     """Examine gains of shape (rows, m, N) under P of shape (parties, rows, N, N) and networks (rows, m, N)."""
     rows, limited, size = gains.shape
     gradient, certificate = np.zeros(rows), np.zeros(rows)
-    networks, which = np.unique(adjacency.reshape(rows, -1), axis=0, return_inverse=True)
+    networks, which = np.unique(chosen(sc, adjacency).reshape(rows, -1), axis=0, return_inverse=True)
     which = which.reshape(-1)
     work = float(np.sum(networks.sum(axis=1)[which].astype(float) ** 3))
     chunk = max(int(_CHUNK_BYTES // (8 * 4 * (limited * size) ** 2)), 1)
