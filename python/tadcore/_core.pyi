@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "Cells",
     "Equilibrium",
     "Gains",
     "Game",
@@ -30,6 +31,37 @@ def simd() -> Literal["baseline", "avx2", "avx512"]:
 
 def grid_times(horizon: float, step: float) -> NDArray[np.float64]:
     """t_0 … t_K, the doubles nearest to k T / K; ScenarioError for a step that does not divide the horizon."""
+
+@final
+class Cells:
+    """A certified map in the making: cells of one player's start from which every game ends alike, and others."""
+
+    def __new__(
+        cls,
+        game: Game,
+        positions: NDArray[np.float64],
+        visibility_radii: NDArray[np.float64],
+        capture_radii: NDArray[np.float64],
+        *,
+        player: int,
+        low: Sequence[float],
+        high: Sequence[float],
+        resolution: float,
+        budget: int,
+    ) -> Cells: ...
+    def advance(self, cells: int, *, threads: int | None = None, stop: Stop | None = None) -> int:
+        """Look at the next cells, at most so many; how many it were. Interrupted, the map is as before."""
+
+    @property
+    def done(self) -> bool:
+        """Whether every cell is settled."""
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Cells looked at, and steps of their histories."""
+
+    def leaves(self) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.int8], NDArray[np.int32]]:
+        """The settled cells: corners (L, 4), level, kind (-1 unknown, -2 past the budget, -3 diverges), defender."""
 
 @final
 class Game:

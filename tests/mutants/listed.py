@@ -3,6 +3,7 @@
 The text must occur once in its file. The part is an expression, or a statement ending with a semicolon.
 """
 
+import of_cells
 import of_games
 import of_newton
 import of_riccati
@@ -10,7 +11,7 @@ import of_simd
 import of_synthesis
 import of_worlds
 
-ALL = [of_simd, of_riccati, of_newton, of_synthesis, of_games, of_worlds]
+ALL = [of_simd, of_riccati, of_newton, of_synthesis, of_games, of_worlds, of_cells]
 MUTANTS = {file: mutants for part in ALL for file, mutants in part.MUTANTS.items()}
 
 # Mutants that no test can tell from the program: (file, formula): why.

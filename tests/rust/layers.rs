@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From the ground up; `cost` stands beside `simulation` and reads its records.
-const LAYERS: [&str; 13] = [
+const LAYERS: [&str; 14] = [
     "error",
     "cancel",
     "memory",
@@ -19,6 +19,7 @@ const LAYERS: [&str; 13] = [
     "simulation",
     "cost",
     "ensemble",
+    "cells",
 ];
 
 /// The modules of the synthesis from the ground up, and the layers that each may use.

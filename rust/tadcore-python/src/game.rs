@@ -43,7 +43,7 @@ pub(crate) fn termination(continuous: bool) -> Termination {
 
 impl Game {
     /// The policy, solving the equilibrium on first use. An error is found again, not kept: it is cheap to find.
-    fn policy(&self, py: Python<'_>) -> PyResult<Arc<Policy>> {
+    pub(crate) fn policy(&self, py: Python<'_>) -> PyResult<Arc<Policy>> {
         if let Some(policy) = self.generation.solved() {
             return Ok(policy);
         }

@@ -3,6 +3,7 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)]
 
 mod arrays;
+mod cells;
 mod detach;
 mod equilibrium;
 mod errors;
@@ -25,6 +26,8 @@ use tadcore::simulation::Setup;
 /// The compiled core of tadcore.
 #[pymodule]
 mod _core {
+    #[pymodule_export]
+    use super::cells::Cells;
     #[pymodule_export]
     use super::equilibrium::Equilibrium;
     #[pymodule_export]

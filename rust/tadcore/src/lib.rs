@@ -48,6 +48,7 @@
 //! | [`simulation`] | one recorded run |
 //! | [`cost`] | J of every player along a run |
 //! | [`ensemble`] | many runs, outcomes only |
+//! | [`cells`] | boxes of starts from which every game ends alike, with proof |
 //!
 //! What is compiled for many sizes and widths, and therefore takes long, is a crate of its own, `tadcore-kernels`, with
 //! modules of the same names: `cancel`, `memory`, `simd`, and of `synthesis`, `policy` and `ensemble` what knows no game and no network.
@@ -63,6 +64,7 @@
 //! Up to N = 8 kernels are compiled for their size and live on the stack (nalgebra where a matrix type helps); larger
 //! games use faer's blocked kernels, single-threaded. Each module that switches says why, by measurement.
 
+pub mod cells;
 pub mod cost;
 pub mod ensemble;
 pub mod error;

@@ -19,7 +19,7 @@ use crate::network::{squared_distance, squared_norm};
 pub const DIVERGED: f64 = 1e3;
 
 /// The least squared scale: the squares of smaller lengths lose digits.
-const LEAST: f64 = 1e-290;
+pub(crate) const LEAST: f64 = 1e-290;
 
 /// The largest squared distance between any two players at the state `z`, the attacker included.
 #[must_use]
