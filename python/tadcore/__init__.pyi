@@ -16,7 +16,10 @@ from . import (
     verification as verification,
 )
 from ._core import __version__ as __version__
+from .analysis.boxes import CertifiedMap as CertifiedMap
 from .analysis.budget import BestRadii as BestRadii, best_radii as best_radii
+from .analysis.certified import certified_map as certified_map
+from .analysis.loading import load_certified_map as load_certified_map
 from .analysis.maps import OutcomeMap as OutcomeMap, outcome_map as outcome_map
 from .analysis.placement import BestStart as BestStart, best_start as best_start
 from .analysis.probabilities import ProbabilityMap as ProbabilityMap, probability_map as probability_map

@@ -3,7 +3,10 @@
 from tadcore.statistics.radius import RadiusCurve
 from tadcore.statistics.sobol import Sensitivity, sobol
 
+from .boxes import CertifiedMap
 from .budget import BestRadii, best_radii
+from .certified import certified_map
+from .loading import load_certified_map
 from .maps import OutcomeMap, outcome_map
 from .placement import BestStart, best_start
 from .probabilities import ProbabilityMap, probability_map
@@ -15,6 +18,7 @@ from .sweeps import SweepResult, sweep
 __all__ = [
     "BestRadii",
     "BestStart",
+    "CertifiedMap",
     "OutcomeMap",
     "ProbabilityMap",
     "RadiusCurve",
@@ -22,6 +26,8 @@ __all__ = [
     "SweepResult",
     "best_radii",
     "best_start",
+    "certified_map",
+    "load_certified_map",
     "outcome_map",
     "probability_map",
     "radius_curve",

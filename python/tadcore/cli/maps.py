@@ -11,12 +11,15 @@ import typer
 
 from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
+from tadcore.scenario.model import Scenario
 
 from .options import Changes, Json, Quiet, Source, read, writable
 from .terminal import emit, hush, hushed, say
 
 MOST_PLACES = 100_000
 """Places along one axis of a map."""
+MOST_BOXES = 10**9
+"""Boxes of a certified map."""
 
 
 def draw_map(
@@ -32,6 +35,15 @@ def draw_map(
     size: Annotated[
         int, typer.Option(metavar="N", min=1, max=MOST_PLACES, help="Places along x; along y in proportion.")
     ] = 400,
+    certified: Annotated[
+        bool,
+        typer.Option(
+            "--certified", help="Prove the outcomes, box by box, instead of sampling them; --size is the finest."
+        ),
+    ] = False,
+    budget: Annotated[
+        int, typer.Option(metavar="N", min=1, max=MOST_BOXES, help="With --certified: boxes to look at, at most.")
+    ] = 200_000,
     time: Annotated[bool, typer.Option("--time", help="Draw when the game ends, not how.")] = False,
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
@@ -44,6 +56,7 @@ def draw_map(
       tadcore map paper-i1 --out map.png
       tadcore map my.toml --player d2 --x -3 3 --y -3 3 --size 800 --out map.pdf
       tadcore map my.toml --out map.nc
+      tadcore map paper-i1-full --certified --size 1024 --out proof.png
 
     The other players start where the scenario has them.
     """
@@ -53,6 +66,9 @@ def draw_map(
     check_destination("--out", out)
     writable("--out", out)
     sc = read(scenario, changes)
+    if certified:
+        _certify(sc, player, x, y, z, size, budget, out, as_json=as_json, time=time, threads=threads, progress=progress)
+        return
     grid = {"x": (*x, size), "y": (*y, _rows(x, y, size))}
     found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress and not hushed())
     found.save(out, **({"quantity": "time"} if time else {}))
@@ -63,6 +79,51 @@ def draw_map(
     say(f"written to {out}")
     if as_json:
         emit({"player": found.player, "places": total, "counts": found.counts(), "file": str(out)})
+
+
+def _certify(
+    sc: Scenario,
+    player: str,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    z: float | None,
+    size: int,
+    budget: int,
+    out: Path,
+    *,
+    as_json: bool,
+    time: bool,
+    threads: int | None,
+    progress: bool,
+) -> None:
+    """Prove the outcomes instead, box by box."""
+    from tadcore.analysis.certified import certified_map
+
+    for option, given in (("--time", time), ("--z", z is not None)):
+        if given:
+            raise ScenarioError(
+                option, "given", "left out with --certified: outcomes in the plane are proved, no times"
+            )
+    least = max(abs(x[1] - x[0]), abs(y[1] - y[0])) / size
+    show = progress and not hushed()
+    found = certified_map(sc, player, x=x, y=y, resolution=least, budget=budget, threads=threads, progress=show)
+    found.save(out)
+    boxes = found.dataset.sizes["box"]
+    say(f"{boxes:,} boxes for the start of {found.player}; {share(100.0 * found.proved, 2)} % of the area proved")
+    for name, (low, high) in found.bounds().items():
+        say(f"{name:<12} between {share(low)} and {share(high)} of the area", indent=2)
+    say(f"written to {out}")
+    if as_json:
+        emit(
+            {
+                "player": found.player,
+                "boxes": boxes,
+                "proved": found.proved,
+                "shares": found.shares(),
+                "bounds": {name: list(pair) for name, pair in found.bounds().items()},
+                "file": str(out),
+            }
+        )
 
 
 def _rows(x: tuple[float, float], y: tuple[float, float], size: int) -> int:

@@ -7,6 +7,7 @@ from .run.network import network as network
 from .run.raster import MAX_ROWS as MAX_ROWS, visibility as visibility
 from .run.series import MAX_VERTICALS as MAX_VERTICALS, controls as controls, distances as distances, theta as theta
 from .run.trajectories import MAX_EDGE_LABELS as MAX_EDGE_LABELS, trajectories as trajectories
+from .study.certified import certified_map as certified_map
 from .study.charts import (
     comparison as comparison,
     incidence as incidence,

@@ -13,6 +13,7 @@ MODULES += [
     ".study.study",
     ".analysis.sweeps",
     ".analysis.maps",
+    ".analysis.certified",
 ]
 MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
 MODULES += [".verification.every_check", ".verification.continuous.events"]

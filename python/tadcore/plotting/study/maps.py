@@ -101,16 +101,22 @@ def frame(
 ) -> tuple[Axes, Floats, Floats, tuple[float, float, float, float]]:
     """The axes of a map, with room beside them where there will be a bar of colours; its places and where it ends."""
     x, y = (np.asarray(found.dataset[axis].values, dtype=float) for axis in "xy")
-    left, right, bottom, top = extent = (*_edges(x, y), *_edges(y, x))
+    extent = (*_edges(x, y), *_edges(y, x))
+    return region(found.player, extent, ax, bar=bar), x, y, extent
+
+
+def region(player: str, extent: Extent, ax: Axes | None, *, bar: bool) -> Axes:
+    """Axes over the starts of one player, in proportion."""
+    left, right, bottom, top = extent
     ratio = (top - bottom) / (right - left)
     width = PAGE if ratio < 1.0 / 3.0 else COLUMN
     beside = 0.65 if bar else 0.0  # inches
     ax = new_axes(ax, width, float(np.clip((width - 0.6 - beside) * ratio + (0.5 if bar else 0.8), 1.6, 5.5)))
-    who = symbol(found.player)
+    who = symbol(player)
     ax.set(xlabel=f"$x_{{{who}}}(0)$", ylabel=f"$y_{{{who}}}(0)$", xlim=(left, right), ylim=(bottom, top))
     ax.set_autoscale_on(False)
     ax.set_aspect("equal")
-    return ax, x, y, extent
+    return ax
 
 
 def _edges(points: Floats, others: Floats) -> tuple[float, float]:

@@ -176,7 +176,7 @@ impl Cell {
         if self.histories.len() > 1 {
             self.unite(spare);
         }
-        if (k + 1) % TURN == 0 {
+        if (k + 1).is_multiple_of(TURN) {
             self.histories.iter_mut().for_each(Enclosure::turn);
         }
     }
