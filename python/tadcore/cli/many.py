@@ -14,13 +14,14 @@ from tadcore._shared.shares import estimate, percent
 from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
 
-from .options import Quiet, writable
+from .options import Quiet, naming, writable
 from .terminal import hush, hushed, say, sign_of_life
 
 if TYPE_CHECKING:
     from tadcore.study.study import Study
 
 _DATA = ".nc"
+_MOST_RADII = 100_000
 File = Annotated[str, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")]
 Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")]
 
@@ -47,9 +48,14 @@ def curve(
     from tadcore.analysis.radius import radius_curve
     from tadcore.statistics.outcomes import excluding
 
-    grid = np.linspace(*radii)
+    if not 1 <= radii[2] <= _MOST_RADII:
+        raise ScenarioError("--radii", radii, f"LOW HIGH N, with N from 1 to {_MOST_RADII:,}")
+    with np.errstate(all="ignore"):  # ends that are none are left to the curve to refuse
+        grid = np.linspace(*radii)
     options: dict[str, Any] = {"player": player, "radii": grid, "kind": kind, "progress": progress and not hushed()}
-    found = radius_curve(_read(file), **options)
+    wanted = _read(file)
+    with naming(**options | {"radii": radii}):
+        found = radius_curve(wanted, **options)
     say(f"{kind} radius of {player}, {found.trials:,} trials at each; {percent(found.level)} intervals, all at once")
     for r, radius in enumerate(found.radii):
         cells = []

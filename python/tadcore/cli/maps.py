@@ -13,7 +13,7 @@ from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
-from .options import Changes, Json, Quiet, Source, read, writable
+from .options import Changes, Json, Quiet, Source, naming, read, writable
 from .terminal import emit, hush, hushed, say
 
 MOST_PLACES = 100_000
@@ -70,7 +70,10 @@ def draw_map(
         _certify(sc, player, x, y, z, size, budget, out, as_json=as_json, time=time, threads=threads, progress=progress)
         return
     grid = {"x": (*x, size), "y": (*y, _rows(x, y, size))}
-    found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress and not hushed())
+    if size == 1 and (x[0] != x[1] or y[0] != y[1]):
+        raise ScenarioError("--size", size, "at least 2 for a range")
+    with naming(player=player, x=x, y=y, z=z, threads=threads):
+        found = outcome_map(sc, player, **grid, z=z, threads=threads, progress=progress and not hushed())
     found.save(out, **({"quantity": "time"} if time else {}))
     total = found.dataset["kind"].size
     say(f"{total:,} places for the start of {player}")
@@ -157,5 +160,6 @@ def write_report(
 
     writable("--out", out)
     result = StudyResult.load(folder)
-    report(result, out, title=title, level=level)
+    with naming(level=level):
+        report(result, out, title=title, level=level)
     say(f"{result.trials:,} trials; written to {out}")

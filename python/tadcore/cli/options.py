@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -65,6 +67,18 @@ def _refuse_what_is_not_there(source: str) -> None:
         raise FileNotFoundError(errno.ENOENT, words, source) from None
     except OSError:
         return
+
+
+@contextmanager
+def naming(**options: object) -> Iterator[None]:
+    """Let an error about an argument name the option, and what was given to it, by the name of the argument."""
+    try:
+        yield
+    except ScenarioError as error:
+        if error.field not in options or len(error.errors) > 1:
+            raise
+        rule = error.rule.replace("(low, high, count)", "LOW HIGH")
+        raise ScenarioError(f"--{error.field}", options[error.field], rule) from None
 
 
 def usable(out: Path | None) -> None:

@@ -14,7 +14,7 @@ from tadcore._shared.files import destination
 from tadcore.errors import ScenarioError
 from tadcore.scenario import worlds
 
-from .options import FAILED, Changes, Json, Quiet, Source, has_windows, read, usable
+from .options import FAILED, Changes, Json, Quiet, Source, has_windows, naming, read, usable
 from .terminal import complain, emit, hush, say, sign_of_life, spill
 
 
@@ -60,8 +60,9 @@ def simulate(
     from tadcore.simulation.play import simulate as play
     from tadcore.simulation.termination import as_termination
 
-    when = as_termination(termination)
-    run = play(sc, termination=when, seed=seed, trial=trial)
+    with naming(termination=termination, seed=seed, trial=trial):
+        when = as_termination(termination)
+        run = play(sc, termination=when, seed=seed, trial=trial)
     for line in _lines(run):
         say(line)
     if out is not None:

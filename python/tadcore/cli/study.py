@@ -13,7 +13,7 @@ from tadcore._shared.shares import percent
 from tadcore._shared.toml import STDIN, read_stdin
 from tadcore.errors import ScenarioError
 
-from .options import Json, Quiet
+from .options import Json, Quiet, naming
 from .terminal import complain, emit, hush, hushed, say
 
 _INTERRUPTED = 130
@@ -91,7 +91,8 @@ def study(
     }
     options |= {"keep": None if keep is None else keep.value, "part": which}
     try:
-        result = wanted.run(**options)
+        with naming(**options):
+            result = wanted.run(**options)
     except KeyboardInterrupt:
         complain(f"interrupted; what was finished is in {store}, and the same command resumes from there")
         raise typer.Exit(_INTERRUPTED) from None

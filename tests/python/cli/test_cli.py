@@ -269,6 +269,32 @@ def test_an_odd_number_is_taken_or_refused_by_name(tadcore, tmp_path, arguments,
         assert not (tmp_path / "map.png").exists()
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("--x nan 1", "--x: got (nan, 1.0), must be LOW HIGH"),
+        ("--x 1 1", "--x: got (1.0, 1.0), must be LOW HIGH with low < high"),
+        ("--y 5 1", "--y: got (5.0, 1.0), must be LOW HIGH with low < high"),
+        ("--y 0 1e200", "--y: got (0.0, 1e+200), must be a range"),
+        ("--size 1", "--size: got 1, must be at least 2"),
+        ("--z 1", "--z: got 1.0, must be left out"),
+        ("--player d9", "--player: got 'd9', must be one of"),
+        ("--threads 0", "--threads: got 0"),
+    ],
+)
+def test_a_map_that_cannot_be_made_names_the_option(tadcore, tmp_path, given, said):
+    code, _, err = tadcore("map", "paper-i1", *given.split(), "--out", tmp_path / "map.png")
+    assert code == 2
+    assert said in err
+
+
+@pytest.mark.parametrize("given", ["--seed=-1", "--trial=-1", "--termination=late"])
+def test_a_run_that_cannot_be_made_names_the_option(tadcore, given):
+    code, _, err = tadcore("simulate", "paper-i1", given)
+    assert code == 2
+    assert f"{given.partition('=')[0]}: got" in err
+
+
 @pytest.mark.parametrize("value", ["nan", "inf", "0", "1", "-1", "2", "x"])
 def test_an_odd_level_is_refused_by_name(tadcore, tmp_path, value):
     study = tmp_path / "study.toml"
