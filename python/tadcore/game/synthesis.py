@@ -60,12 +60,15 @@ class Gains:
     iterations : int
         Steps of the solver.
     converged : bool
-        Whether the relative gradient norm reached the tolerance; `status` says how it ended.
+        Whether the relative gradient norm reached the tolerance; `status` says how it ended. Where players differ more
+        than a hundredfold, and where γ gives S next to no weight, also whether Newton's model has no more than 10⁻⁷ of
+        Θ to gain; under a weight on S that is lost in the rounding of the gradient, never.
     status : str
         How the solver ended.
     gradient_norm : float
         Norm of the gradient at the end, relative to the parts that cancel in it. Where these differ more than a
-        hundredfold from player to player, the largest of a player, relative to that player's parts.
+        hundredfold from player to player, or γ gives S next to no weight, the largest of a player, relative to that
+        player's parts.
     certified : bool
         Whether these gains are proved to be a global minimum of Θ among scalar gains, up to rounding.
     start : {"canonical", "complex", "stacked", "reversed"}

@@ -91,7 +91,8 @@ pub struct Gains {
     /// Θ, reduced.
     pub theta: f64,
     /// Norm of the gradient with respect to the variables, relative to the parts that cancel in it. Where these parts
-    /// differ more than a hundredfold from player to player, the largest of a player, relative to that player's parts.
+    /// differ more than a hundredfold from player to player, or S has next to no weight, the largest of a player,
+    /// relative to that player's parts.
     pub gradient_norm: f64,
     /// Iterations of all descents together.
     pub iterations: usize,

@@ -73,6 +73,11 @@ impl Candidate {
         })
     }
 
+    /// The same network, for another search.
+    pub(crate) fn again(&self) -> Result<Self, NoMemory> {
+        Self::new(self.variables.clone(), copy("the gains of one network", &self.initial)?, self.size, self.complete)
+    }
+
     /// Notes, after the first descent, whether later ones may end early.
     pub(crate) fn note_quick(&mut self) {
         self.quick = self.iterations <= QUICK;

@@ -9,7 +9,8 @@
 //! 3. Further restarts: Newton from the best point with rows and gains reversed, and rows exchanged, again while that goes
 //!    lower: GᵀRG sees neither the sign of a row of √R·G nor whose it is, so minima come in families (`moves`).
 //! 4. Where the parts of Θ differ by decades from player to player, Newton to the end for each of them (`refine`).
-//! 5. Without weight on S minima need not be unique: which of equal ones is taken (`settle`).
+//! 5. With next to no weight on S, or none, the stages above are those of two other Θ, from whose minima the weight is
+//!    lowered to γ's own: without any, which of equal minima is taken (`settle`).
 //!
 //! Games of N > 8 have a search of their own with the same stages, whose restarts a model of Θ chooses (`large`).
 //!
@@ -35,7 +36,7 @@
 //! | `stages` | the stages above |
 //! | `large` | the same for large games |
 //! | `refine` | the end of the search where players differ by decades |
-//! | `settle` | which of equal minima is taken where S has no weight |
+//! | `settle` | the search where S has next to no weight, and which of equal minima is taken where it has none |
 
 mod candidate;
 mod gradient;

@@ -5,10 +5,15 @@
 //! [`UNEVEN`], each row of the gradient is measured by the parts of its own player, and the search ends with Newton's
 //! method in variables scaled by the Hessian's diagonal.
 //!
+//! In a flat valley even that says little: what a gradient leaves to be gained is ½∇Θᵀ∇²Θ⁻¹∇Θ. There, and where S has
+//! next to no weight, Newton goes on until this is a [`NOTHING`]th of Θ, and gains that leave more than [`LITTLE`] of it
+//! are not called converged.
+//!
 //! | symbol | here | meaning |
 //! |---|---|---|
 //! | ‖∇_iΘ‖ / s_i, the largest | [`Rows::worst`] | the relative gradient of one player |
 //! | s_i | `Rows::scale` | the sizes of the parts of ∇_iΘ at F |
+//! | ½∇Θᵀ∇²Θ⁻¹∇Θ | `left` | what Newton's model at the point has still to gain |
 //!
 //! Source: ours.
 
@@ -19,7 +24,7 @@ use crate::error::Stopped;
 use crate::memory::zeros;
 use crate::simd::{Width, norm, widened};
 use crate::synthesis::newton::{
-    Backend, Layout, Limits, Objective, Reached, Variable, back, factorise, forward, packed,
+    Backend, Layout, Limits, Objective, Reached, Status, Variable, back, factorise, forward, packed,
 };
 use crate::synthesis::theta::{Problem, RealGains};
 
@@ -32,6 +37,15 @@ const DAMPINGS: usize = 60;
 const NOISE: f64 = 1e-15;
 /// Damping after the first step that does not pay; the diagonal of the scaled Hessian is one.
 const FIRST_DAMPING: f64 = 1e-3;
+/// What may be left to be gained, relative to Θ: where Newton ends, and where gains count as converged.
+const NOTHING: f64 = 1e-10;
+const LITTLE: f64 = 1e-7;
+/// What is added to the scaled Hessian, whose diagonal is one, where rounding makes it indefinite.
+const ROUNDED: [f64; 4] = [0.0, 1e-14, 1e-12, 1e-10];
+/// The least curvature that a scaled Hessian can show.
+const ROUNDING: f64 = 1e-16;
+/// A weight on S, relative to Θ's parts, below which doubles do not show the slope along the valley that it makes.
+const UNSEEN: f64 = 1e-13;
 /// What asks for memory here.
 const WHAT: &str = "the last steps of the synthesis of one network";
 
@@ -84,16 +98,23 @@ impl Search<'_> {
     /// largest of a player, and says whether it has converged.
     pub(super) fn refine(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         let rows = Rows::of(self.problem);
-        if !rows.uneven() {
+        // Where some S has no weight, minima need not be points.
+        let measured = self.problem.unweighted().is_empty();
+        let faint = if measured { self.problem.faint() } else { Vec::new() };
+        if !rows.uneven() && faint.is_empty() {
             return Ok(());
         }
+        let unseen = faint.iter().any(|&i| self.problem.weight(&[i]) < UNSEEN);
         let mut moved = Vec::new();
         for (e, candidate) in candidates.iter_mut().enumerate().filter(|(_, c)| !c.complete && !c.variables.is_empty())
         {
             let before = candidate.iterations;
-            follow(Width::in_use(), self.problem, &rows, candidate, self.limits, self.dispatcher.cancel())?;
+            follow(Width::in_use(), self.problem, &rows, measured, candidate, self.limits, self.dispatcher.cancel())?;
             if candidate.iterations > before && !candidate.certified {
                 moved.push(e);
+            }
+            if unseen && candidate.reached.status == Status::Converged {
+                candidate.reached.status = Status::Stalled;
             }
         }
         self.certify(candidates, &moved)
@@ -103,7 +124,14 @@ impl Search<'_> {
 widened! {
     /// Newton's method from the best point of one candidate.
     #[inline(never)]
-    fn follow<V>(problem: &Problem, rows: &Rows, candidate: &mut Candidate, limits: Limits, cancel: &CancelToken) -> Result<(), Stopped> {
+    fn follow<V>(
+        problem: &Problem,
+        rows: &Rows,
+        measured: bool,
+        candidate: &mut Candidate,
+        limits: Limits,
+        cancel: &CancelToken,
+    ) -> Result<(), Stopped> {
         let mut objective = RealGains::<f64, 0>::new(&problem.theta.double, Some(cancel))?;
         let backend = Backend { library: true, width: Width::in_use(), cancel: Some(cancel) };
         let (n, mut layout) = (problem.size, Layout::default());
@@ -123,9 +151,10 @@ widened! {
         let (mut damping, mut steps) = (0.0_f64, 0);
         // What is within the tolerance of all is left as it is.
         let enough = if worst > limits.acceptable { limits.tolerance } else { f64::INFINITY };
-        while worst > enough && steps < STEPS {
+        let (mut left, mut noise) = (0.0, 0.0);
+        while measured || worst > enough && steps < STEPS {
             cancel.check()?;
-            if steps == 0 {
+            if factor.is_empty() {
                 (hessian, factor) = (zeros(WHAT, packed(d))?, zeros(WHAT, d * d)?);
             }
             objective.keep(true);
@@ -138,7 +167,21 @@ widened! {
             for a in 0..used {
                 hessian[packed(a)..packed(a + 1)].iter_mut().zip(&diagonal).for_each(|(h, s)| *h *= diagonal[a] * s);
             }
-            let noise = NOISE * (value + (value * objective.value_scale()).sqrt());
+            noise = NOISE * (value + (value * objective.value_scale()).sqrt());
+            if measured {
+                left = f64::INFINITY;
+                for more in ROUNDED {
+                    if factorise(&hessian, more, &layout, backend, &mut factor).0 {
+                        step.iter_mut().zip(&gradient).zip(&diagonal).for_each(|((s, g), scale)| *s = g * scale);
+                        // What was added may be all that there is along the valley.
+                        left = 0.5 * forward(&factor, d, &mut step) * (1.0 + more / ROUNDING);
+                        break;
+                    }
+                }
+                if steps == STEPS || worst <= enough && left <= NOTHING * value + noise {
+                    break;
+                }
+            }
             let mut better = None;
             for _ in 0..DAMPINGS {
                 cancel.check()?;
@@ -177,6 +220,9 @@ widened! {
         let limits = Limits { iterations: usize::MAX, ..limits };
         let scale = candidate.reached.scale;
         candidate.reached = Reached { scale, ..Reached::new(value, worst, 1.0, candidate.iterations, &limits) };
+        if candidate.reached.status == Status::Converged && left > LITTLE * value + noise {
+            candidate.reached.status = Status::Stalled;
+        }
         Ok(())
     }
 }

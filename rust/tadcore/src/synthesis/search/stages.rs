@@ -60,22 +60,33 @@ impl Search<'_> {
         self.limits.iterations = 0;
         self.first(Kind::Real, candidates, true)?;
         self.limits = limits;
+        if candidates.iter().all(|candidate| candidate.complete) {
+            return Ok(());
+        }
+        let faint = self.problem.faint();
+        if faint.is_empty() {
+            return self.everywhere(candidates);
+        }
+        self.settle(candidates, &faint)?;
+        // Where S has no weight at all, what is flat stays so.
+        if self.problem.unweighted().is_empty() { self.refine(candidates) } else { Ok(()) }
+    }
+
+    /// The stages from the first descent to the last, for the candidates that are not complete.
+    pub(super) fn everywhere(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         if self.problem.is_large() {
             for candidate in candidates.iter_mut().filter(|candidate| !candidate.complete) {
                 self.run_large(candidate)?;
             }
-            self.polish(candidates)?;
-            self.refine(candidates)?;
-            return self.settle(candidates);
-        }
-        self.first(Kind::Certified, candidates, false)?;
-        let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].certified).collect();
-        if !open.is_empty() {
-            self.restart(candidates, &open)?;
+        } else {
+            self.first(Kind::Certified, candidates, false)?;
+            let open: Vec<usize> = (0..candidates.len()).filter(|&e| !candidates[e].certified).collect();
+            if !open.is_empty() {
+                self.restart(candidates, &open)?;
+            }
         }
         self.polish(candidates)?;
-        self.refine(candidates)?;
-        self.settle(candidates)
+        self.refine(candidates)
     }
 
     /// The first descent of the candidates that are `complete`, or of the others.

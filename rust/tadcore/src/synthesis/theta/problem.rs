@@ -23,6 +23,9 @@ use crate::simd::{norm, sum_of_squares};
 
 /// A term of Θ this small beside the others is lost in their rounding.
 const LOST: f64 = 1e-15;
+/// A weight on S this small beside the largest entry of γ, and a term of Θ this small beside the others, is faint: the
+/// floor of the valley that it makes is too flat to be searched.
+const FAINT: f64 = 1e-4;
 
 /// Everything Θ needs to know of one instant t_k.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,29 +148,73 @@ impl Problem {
 
     /// The players whose ‖S_i‖² has no weight, or one lost in the rounding of Θ.
     pub(crate) fn unweighted(&self) -> Vec<usize> {
-        let of = &self.theta.double;
-        let (lost, all) = (LOST * of.scale.value, self.feedback(0..self.rows));
-        let small = |i: usize| of.closeness[i] / (of.r[i] * of.r[i]) * all <= lost;
-        (0..self.rows).filter(|&i| lost > 0.0 && small(i)).collect()
+        let weights = self.weights();
+        (0..self.rows).filter(|&i| weights[i] <= LOST).collect()
     }
 
-    /// Θ with a weight on ‖S_i‖² of those players: what it is of Θ's parts, all of them together.
+    /// Those, and the players whose ‖S_i‖² γ gives next to no weight: what it adds to Θ is faint as well.
+    pub(crate) fn faint(&self) -> Vec<usize> {
+        let (weights, most) = (self.weights(), self.gamma.iter().fold(0.0, |a: f64, &b| a.max(b)));
+        let gamma = |i: usize| match self.interaction {
+            Interaction::I1 => self.gamma[3],
+            Interaction::I2 => self.gamma[1 + usize::from(i + 1 == self.rows)],
+        };
+        let faint = |&i: &usize| weights[i] <= LOST || gamma(i) <= FAINT * most && weights[i] <= FAINT;
+        (0..self.rows).filter(faint).collect()
+    }
+
+    /// The weight on ‖S_i‖² of each player, relative to the parts of Θ; one where there are none.
+    fn weights(&self) -> Vec<f64> {
+        let (of, all) = (&self.theta.double, self.feedback(0..self.rows));
+        let weight = |i: usize| of.closeness[i] / (of.r[i] * of.r[i]) * all / of.scale.value;
+        (0..self.rows).map(|i| if of.scale.value > 0.0 { weight(i) } else { 1.0 }).collect()
+    }
+
+    /// The largest of them, of those players.
+    pub(crate) fn weight(&self, players: &[usize]) -> f64 {
+        let weights = self.weights();
+        players.iter().map(|&i| weights[i]).fold(0.0, f64::max)
+    }
+
+    /// The same problem with another Θ.
+    pub(crate) fn with(&self, theta: Precisions) -> Self {
+        Self { theta, ..self.clone() }
+    }
+
+    /// Θ with a weight on ‖S_i‖² of those players besides: what it is of Θ's parts, all of them together.
     pub(crate) fn weighted(&self, players: &[usize], weight: f64) -> Precisions {
-        let (mut of, n) = (self.theta.double.clone(), self.size);
         let all = self.feedback(players.iter().copied());
-        let common = if all > 0.0 { weight * of.scale.value / all } else { 0.0 };
+        let common = if all > 0.0 { weight * self.theta.double.scale.value / all } else { 0.0 };
+        Precisions {
+            double: self.reweighted(players, |i, own| own + common * self.theta.double.r[i].powi(2)),
+            single: None,
+        }
+    }
+
+    /// Θ without weight on ‖S_i‖² of those players.
+    pub(crate) fn without(&self, players: &[usize]) -> Precisions {
+        if players.iter().all(|&i| self.theta.double.closeness[i] == 0.0) {
+            return self.theta.clone();
+        }
+        self.reweighted(players, |_, _| 0.0).into()
+    }
+
+    /// Θ with other weights on ‖S_i‖² of those players, by the player and its own.
+    fn reweighted(&self, players: &[usize], weight: impl Fn(usize, f64) -> f64) -> Coefficients<f64> {
+        let (mut of, n) = (self.theta.double.clone(), self.size);
         for &i in players {
-            let more = common * of.r[i] * of.r[i];
-            of.closeness[i] += more;
+            let other = weight(i, of.closeness[i]);
+            let more = other - of.closeness[i];
+            of.closeness[i] = other;
             for entry in i * n..(i + 1) * n {
                 of.quadratic
                     .iter_mut()
                     .filter(|q| !q.is_empty())
                     .for_each(|q| q[entry * self.rows * n + entry] += 2.0 * more);
             }
-            of.scale.closeness = of.scale.closeness.max(of.closeness[i]);
+            of.scale.closeness = of.scale.closeness.max(other);
         }
-        Precisions { double: of, single: None }
+        of
     }
 
     /// Σ r_i²‖F_i‖² over some players.
