@@ -90,7 +90,7 @@ pub(crate) fn run(py: Python<'_>, of: &Game, error: RunError) -> PyErr {
     match error {
         RunError::Game(error) => game(py, error),
         RunError::Equilibrium(error) => equilibrium(py, of, &error),
-        RunError::Range { .. } | RunError::Cost { .. } | RunError::Network { .. } => {
+        RunError::Range { .. } | RunError::Cost { .. } | RunError::Turns { .. } | RunError::Network { .. } => {
             raise(py, "TadcoreError", (error.to_string(),))
         }
         RunError::Threads(threads) => raise(py, "ScenarioError", ("threads", threads, "a number the system can start")),

@@ -158,6 +158,15 @@ pub enum RunError {
         /// The time of the end.
         time: f64,
     },
+    /// A motion turns too often within one step for the crossings of a radius to be found.
+    #[error(
+        "within the step after t = {time} the players turn too often for crossings of a capture radius to be found: the \
+         step is too long for these weights"
+    )]
+    Turns {
+        /// The instant before the step.
+        time: f64,
+    },
     /// A network from outside could not be given.
     #[error("the network of the run could not be given at t = {time}")]
     Network {

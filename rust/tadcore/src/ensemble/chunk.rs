@@ -53,6 +53,9 @@ pub(super) struct Chunk<'a> {
 
 impl<'a> Chunk<'a> {
     /// The trials from `first` on at their initial positions.
+    ///
+    /// # Errors
+    /// [`NoMemory`] where there is none for so many.
     pub(super) fn new(
         policy: &'a Policy,
         batch: &'a Batch<'a>,
@@ -60,9 +63,9 @@ impl<'a> Chunk<'a> {
         first: usize,
         trials: usize,
         width: Width,
-    ) -> Self {
-        let trials = Trials::new(policy, batch, played, first, trials, width);
-        Self { sweep: sweep_of(&trials.shape), trials, width }
+    ) -> Result<Self, NoMemory> {
+        let trials = Trials::new(policy, batch, played, first, trials, width)?;
+        Ok(Self { sweep: sweep_of(&trials.shape), trials, width })
     }
 
     /// Plays every trial to its end.

@@ -5,12 +5,17 @@
 
 use super::block::{BLOCK, Shape};
 use super::noise::Noise;
+use crate::error::NoMemory;
+use crate::memory::{MOST_BYTES, grow, reserve_exact, within};
 use crate::network::{Links, Topology, observe};
 use crate::random::{Draws, NEVER, Walk};
 use crate::simd::Width;
 use crate::simulation::{Chances, Conditions};
 use tadcore_kernels::ensemble::block::Blocks;
 use tadcore_kernels::ensemble::network::{Network, Relay, Rule, Words};
+
+/// What asks for memory here.
+const WHAT: &str = "what fails and who is told in the trials of a batch";
 
 /// A world, as the trials of a batch meet it.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +57,9 @@ impl Rule for Told {
 
 impl<'a> Fates<'a> {
     /// Of the trials from `first` on, at step 0; gives the blocks what comes between sight and network.
+    ///
+    /// # Errors
+    /// [`NoMemory`] where there is none for the chains of all these trials.
     pub(super) fn new(
         played: &Played<'a>,
         first: usize,
@@ -59,29 +67,45 @@ impl<'a> Fates<'a> {
         shape: Shape,
         width: Width,
         blocks: &mut Blocks,
-    ) -> Self {
+    ) -> Result<Self, NoMemory> {
         let Played { conditions, chances } = *played;
         let failures = &conditions.failures;
         let count = blocks.far.len();
-        let words = |all: &Topology| -> Vec<Words> {
-            (0..count).flat_map(|_| all.words().iter().map(|&word| [word; BLOCK]).collect::<Vec<_>>()).collect()
-        };
         let edges = Topology::complete(shape.rows, shape.size);
         let links = Topology::from_fn(shape.rows, shape.rows, |i, j| i != j);
-        let relay = conditions.links.as_ref().map(|talk| {
-            let rule = Box::new(Told { links: talk.clone(), rows: shape.rows, size: shape.size });
-            Relay::new(&shape, talk.reach(), count, words(&links), rule)
-        });
-        let up = if failures.blind() { words(&edges) } else { Vec::new() };
+        let chains = who.len() * failures.len();
+        // A relay keeps the words of what was seen, heard and told last, too: asked for here, and given back.
+        let all = size_of::<Words>() * count * (3 * edges.words().len() + 2 * links.words().len());
+        within(WHAT, (chains * size_of::<Walk>() + all) as u128, MOST_BYTES)?;
+        reserve_exact(WHAT, &mut Vec::<u8>::new(), all)?;
+        let words = |all: &Topology| -> Result<Vec<Words>, NoMemory> {
+            let mut list = Vec::new();
+            reserve_exact(WHAT, &mut list, count * all.words().len())?;
+            for _ in 0..count {
+                list.extend(all.words().iter().map(|&word| [word; BLOCK]));
+            }
+            Ok(list)
+        };
+        let relay = match &conditions.links {
+            None => None,
+            Some(talk) => {
+                let rule = Box::new(Told { links: talk.clone(), rows: shape.rows, size: shape.size });
+                Some(Relay::new(&shape, talk.reach(), count, words(&links)?, rule))
+            }
+        };
+        let up = if failures.blind() { words(&edges)? } else { Vec::new() };
         blocks.network = (relay.is_some() || !up.is_empty()).then(|| Box::new(Network::new(width, shape, up, relay)));
+        let (mut walks, mut due) = (Vec::new(), Vec::new());
+        grow(WHAT, &mut walks, chains, Walk::default())?;
+        grow(WHAT, &mut due, count * BLOCK, NEVER)?;
         let mut fates = Self {
             conditions,
             chances,
             first: first as u64,
             shape,
             all_up: (edges, links),
-            walks: vec![Walk::default(); who.len() * failures.len()],
-            due: vec![NEVER; count * BLOCK],
+            walks,
+            due,
             noise: conditions.spread.as_ref().map(|spread| Noise::new(spread, shape, chances.seed, width)),
         };
         for (place, &trial) in who.iter().enumerate() {
@@ -89,7 +113,7 @@ impl<'a> Fates<'a> {
             fates.due[place] = failures.begin(&draws, fates.own(trial));
             fates.write(place, trial, blocks);
         }
-        fates
+        Ok(fates)
     }
 
     fn draws(&self, trial: u32) -> Draws {

@@ -76,7 +76,7 @@ fn play(game: &Game, batch: &Batch, i: usize, between: Between, cancel: &CancelT
         Err(error) => return Err(error.into()),
     };
     let mut ends = [End::NOT_PLAYED];
-    let mut chunk = Chunk::new(&policy, &row, None, 0, 1, Width::in_use());
+    let mut chunk = Chunk::new(&policy, &row, None, 0, 1, Width::in_use())?;
     chunk.play(between, &mut ends, &mut Worker::new(&policy), cancel)?;
     let [end] = ends;
     Ok(GameEnd::Played { end, time: game.grid().time_after(end.step, end.after) })

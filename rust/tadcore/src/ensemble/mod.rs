@@ -41,6 +41,8 @@ pub const CHUNK: usize = 8192;
 const CHUNK_BYTES: usize = 64 << 20;
 /// Bytes that a thread may need before anything is tabulated.
 const THREAD_BYTES: usize = 16 << 20;
+/// Addresses that the system's allocator takes for a thread of its own, of which little is touched.
+const HEAP_BYTES: usize = 64 << 20;
 /// Trials that are checked between two looks at the cancel token.
 const CHECKED: usize = 4096;
 /// Threads beyond which more would only be started: for each core, and on machines of few.
@@ -173,13 +175,19 @@ pub fn run_with(
     Ok(ends)
 }
 
-/// How many threads to start where so many could have work.
+/// How many threads to start where so many could have work, and fewer where the process may not have the memory for
+/// them: what is small is allocated by calls that end the process where they fail, and does not come to that.
 fn threads_for(threads: Option<usize>, work: usize) -> Result<usize, RunError> {
     let cores = available_parallelism().map_or(1, usize::from);
     let threads = threads.filter(|&t| t > 0).unwrap_or(cores).min(THREADS.1.max(THREADS.0 * cores));
     let threads = threads.min(work).max(1);
     // Stacks, chunks and what the allocator keeps for each thread: asked for together, and given back.
-    memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES)?;
+    let room = |threads: usize| {
+        let heaps = if threads > 1 { (threads + 1) * HEAP_BYTES } else { 0 };
+        memory::reserve_exact("the threads of a batch", &mut Vec::<u8>::new(), (threads + 1) * THREAD_BYTES + heaps)
+    };
+    let threads = (2..=threads).rev().find(|&t| room(t).is_ok()).unwrap_or(1);
+    room(threads)?;
     Ok(threads)
 }
 
@@ -206,7 +214,7 @@ fn play(
     let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
     let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
     let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
-        Chunk::new(policy, batch, played, c * size, ends.len(), width).play(between, ends, worker, cancel)
+        Chunk::new(policy, batch, played, c * size, ends.len(), width)?.play(between, ends, worker, cancel)
     };
     if threads == 1 || ends.len() <= size {
         let mut worker = Worker::new(policy);

@@ -3,11 +3,16 @@
 use super::block::{BLOCK, Blocks, PerTrial, Shape};
 use super::fates::{Fates, Played};
 use super::{Batch, End};
+use crate::error::NoMemory;
+use crate::memory::grow;
 use crate::network::{Topology, observe, squared_reach};
 use crate::policy::Policy;
 use crate::simd::Width;
 use crate::simulation::divergence::{self, within};
 use crate::simulation::{Outcome, Reach};
+
+/// What asks for memory here.
+const WHAT: &str = "the trials of a batch";
 
 /// Trials of a batch from `first` on; those that still play fill the places from the front.
 pub(super) struct Trials<'a> {
@@ -24,6 +29,9 @@ pub(super) struct Trials<'a> {
 
 impl<'a> Trials<'a> {
     /// The trials from `first` on at their initial positions.
+    ///
+    /// # Errors
+    /// [`NoMemory`] where there is none for so many.
     pub(super) fn new(
         policy: &'a Policy,
         batch: &'a Batch<'a>,
@@ -31,11 +39,13 @@ impl<'a> Trials<'a> {
         first: usize,
         trials: usize,
         width: Width,
-    ) -> Self {
+    ) -> Result<Self, NoMemory> {
         let (size, rows, dim) = (policy.game().size(), policy.game().constrained(), batch.dim);
         let shape = Shape { size, rows, dim, words: (rows * size).div_ceil(64) };
         let blocks = trials.div_ceil(BLOCK);
-        let mut z = vec![[0.0; BLOCK]; blocks * size * dim];
+        let (mut z, mut far) = (Vec::new(), Vec::new());
+        grow(WHAT, &mut z, blocks * size * dim, [0.0; BLOCK])?;
+        grow(WHAT, &mut far, blocks, [0.0; BLOCK])?;
         for place in 0..blocks * BLOCK {
             // Places past the last trial repeat the first of their block, so that they ask for nothing new.
             let trial = if place < trials { place } else { place / BLOCK * BLOCK };
@@ -49,16 +59,15 @@ impl<'a> Trials<'a> {
         let (sight, sight_step) = reaches(batch.visibility, rows, first, trials);
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who: Vec<u32> = (0..trials as u32).collect();
-        let far = vec![[0.0; BLOCK]; blocks];
         let mut blocks = Blocks { z, sight, capture, far, sight_step, capture_step, network: None, live: trials };
-        let fates = played.map(|played| Fates::new(played, first, &who, shape, width, &mut blocks));
+        let fates = played.map(|played| Fates::new(played, first, &who, shape, width, &mut blocks)).transpose()?;
         let mut of_chunk = Self { policy, batch, first, shape, blocks, who, fates };
         for place in 0..of_chunk.blocks.far.len() * BLOCK {
             let scale = divergence::scale(&of_chunk.state(place), dim);
             of_chunk.blocks.far[place / BLOCK][place % BLOCK] = divergence::limit(scale);
         }
         of_chunk.fill_up();
-        of_chunk
+        Ok(of_chunk)
     }
 
     /// Moves what fails on to t_k.

@@ -31,7 +31,7 @@ const LEVELS: usize = 64;
 const SHORT: f64 = 1.0;
 /// A chord is exact where it is off by no more than this part of its ends.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Parts of one step that are looked at for one row; far more than any motion needs that stays a double.
+/// Parts of one step that are looked at for one row: enough for hundreds of turns in one step.
 const PARTS: usize = 1 << 16;
 
 #[derive(Debug)]
@@ -50,8 +50,9 @@ pub(crate) struct Motion<'a> {
     norm: f64,
     square: Vec<f64>,
     levels: Vec<Level>,
-    /// Parts that may still be looked at.
+    /// Parts that may still be looked at, and whether there were too few: what was found is then not to be relied on.
     left: usize,
+    lost: bool,
     cancel: &'a CancelToken,
 }
 
@@ -91,7 +92,7 @@ impl<'a> Motion<'a> {
         let norm = closed_loop::norm(c, size);
         let mut square = zeros(WHAT, size * size)?;
         multiply(&mut square, c, c, size, cancel)?;
-        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, cancel })
+        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, lost: false, cancel })
     }
 
     /// The first s in (0, δ] with ‖z_i(s)‖² ≤ `reach`, from a start outside; `start` and `end` are z(0) and z(δ).
@@ -108,6 +109,11 @@ impl<'a> Motion<'a> {
         self.left = PARTS;
         self.nearer(i, Part { level: 0, from: 0.0, start, end }, &mut best)?;
         Ok(best)
+    }
+
+    /// Whether the motion turned too often for some row to be followed.
+    pub(crate) fn lost(&self) -> bool {
+        self.lost
     }
 
     /// z(s), and what h ∫₀ˢ exp(Cτ) dτ z(0) adds to the position of the player whose feedback is `row`.
@@ -156,6 +162,7 @@ impl<'a> Motion<'a> {
     fn chord(&mut self, i: usize, part: Part) -> Result<Chord, Stopped> {
         let (dim, width) = (self.dim, self.width(part.level));
         let (p, q) = (&part.start[i * dim..(i + 1) * dim], &part.end[i * dim..(i + 1) * dim]);
+        self.cancel.check()?;
         self.left = self.left.saturating_sub(1);
         let squared = squared_distance(p, q);
         let along: f64 = p.iter().zip(q).map(|(p, q)| p * (p - q)).sum();
@@ -175,7 +182,10 @@ impl<'a> Motion<'a> {
         };
         let off = 0.125 * width * width * bend;
         let ends = length(p) + length(q);
-        let straight = off <= ROUNDING * ends || part.level >= LEVELS || self.left == 0;
+        let mut straight = off <= ROUNDING * ends || part.level >= LEVELS;
+        if self.left == 0 && !straight {
+            (self.lost, straight) = (true, true);
+        }
         let (nearest, aside) = (at(share), at(foot));
         Ok(Chord { share, nearest, foot, aside, length: squared.sqrt(), off: off + ROUNDING * ends, straight })
     }
@@ -332,6 +342,20 @@ mod tests {
                     );
                 });
             }
+        }
+    }
+
+    /// A row that goes round 10⁵ times in one step, a hair outside a radius: too often to be followed, and it says so.
+    #[test]
+    fn a_motion_that_turns_too_often_says_so() {
+        for (turns, lost) in [(10.0, false), (1e5, true)] {
+            let omega = 2.0 * std::f64::consts::PI * turns;
+            ellipse(omega, 1.0, 1.0 - 1e-6, 1.0, |motion, start, end| {
+                let sigma: f64 = 1.0 - 2e-6;
+                let found = motion.enters(0, sigma * sigma, start, end).expect("memory");
+                assert!(lost || found.is_none());
+                assert_eq!(motion.lost(), lost, "{turns} turns");
+            });
         }
     }
 

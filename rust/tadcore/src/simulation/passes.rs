@@ -6,7 +6,7 @@
 use super::crossing::{Motion, clear};
 use super::outcome::{Outcome, Reach};
 use crate::cancel::CancelToken;
-use crate::error::Stopped;
+use crate::error::RunError;
 use crate::game::validation::BEYOND;
 use crate::memory::{reserve, zeros};
 use crate::policy::{Policy, closed_loop};
@@ -61,13 +61,16 @@ pub(crate) struct Step<'a> {
 impl Step<'_> {
     /// The motion of the step and every radius that is entered within it, in the order of time, an interception before a
     /// capture: the row, and how long after t_k. Calls `see` with both if there may be any.
+    ///
+    /// # Errors
+    /// [`RunError::Turns`] where the motion turns too often to be followed.
     fn entries(
         &self,
         policy: &Policy,
         reach: &Reach,
         cancel: &CancelToken,
-        see: impl FnOnce(&mut Motion, &[(usize, f64)]) -> Result<(), Stopped>,
-    ) -> Result<(), Stopped> {
+        see: impl FnOnce(&mut Motion, &[(usize, f64)]) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
         let (game, size) = (policy.game(), policy.game().size());
         let step = game.grid().step();
         let mut c = zeros(WHAT, size * size)?;
@@ -84,7 +87,8 @@ impl Step<'_> {
             }
         }
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
-        see(&mut motion, &found)
+        see(&mut motion, &found)?;
+        if motion.lost() { Err(RunError::Turns { time: game.grid().time(self.k) }) } else { Ok(()) }
     }
 
     /// Whether some chord comes near enough to its radius for the motion to enter it; `stretch` is [`clear`]'s.
@@ -101,7 +105,7 @@ impl Step<'_> {
         reach: &Reach,
         passes: &mut Vec<Pass>,
         cancel: &CancelToken,
-    ) -> Result<(), Stopped> {
+    ) -> Result<(), RunError> {
         let ending = reach.ends(self.end, self.dim).map(|outcome| reach.row(outcome));
         self.entries(policy, reach, cancel, |motion, found| {
             for &(row, enters) in found.iter().take_while(|entry| Some(entry.0) != ending) {
@@ -121,7 +125,7 @@ impl Step<'_> {
         policy: &Policy,
         reach: &Reach,
         cancel: &CancelToken,
-    ) -> Result<Option<(usize, f64, Vec<f64>, Vec<f64>)>, Stopped> {
+    ) -> Result<Option<(usize, f64, Vec<f64>, Vec<f64>)>, RunError> {
         let step = policy.game().grid().step();
         let mut end = None;
         self.entries(policy, reach, cancel, |motion, found| {
