@@ -177,6 +177,11 @@ def test_a_thousand_defenders_are_a_scenario_and_their_grid_is_refused_by_size()
         ("crowd(300, horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 40),
         ("crowd(300, interaction='I2', horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 10),
         ("crowd(40, zeta=3.0)", "tadcore.simulate_batch(sc, np.repeat([sc.positions], 50_000, 0))", 60),
+        (  # 40,401 chains for each of 200 trials
+            "crowd(200, 0.01, 'I2', 1e-4, 1e-4).replace({'sensing': {'mean_time_detected': 1.0}})",
+            "tadcore.simulate_batch(sc, np.repeat([sc.positions], 200, 0), threads=1)",
+            30,
+        ),
     ],
 )
 def test_a_system_without_memory_is_an_error(make, call, room):
@@ -210,6 +215,22 @@ for call in calls:
 """)
     assert len(printed) == 2
     assert all("thread" in line for line in printed), printed
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the address space")
+@pytest.mark.parametrize("room", [86, 148])
+def test_a_batch_without_room_for_its_threads_is_played_in_fewer(room):
+    """An allocator takes some 64 MiB of addresses for a thread; where they end, the process had been ended."""
+    printed = child(f"""
+sc = crowd(8, zeta=2.0, horizon=0.1, step=0.01)
+starts = np.repeat([sc.positions], 8000, 0)
+starts += np.random.default_rng(0).normal(scale=0.1, size=starts.shape)
+one = tadcore.simulate_batch(sc, starts[:500], threads=1)
+within({room} << 20)
+found = tadcore.simulate_batch(sc, starts, threads=4)
+print((found.kind[:500] == one.kind).all() and (found.time[:500] == one.time).all())
+""")
+    assert printed == ["True"]
 
 
 def test_more_threads_than_work_are_not_started():
