@@ -31,6 +31,9 @@ def verify(
             min=0, max=2, help="Bound Θ from below: 1 at chosen instants, with Clarabel; 2 at every instant, proved."
         ),
     ] = 0,
+    turning: Annotated[
+        int, typer.Option(min=0, max=_MOST, help="Descents in gains that turn at each instant; measure their gap.")
+    ] = 0,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report there, as JSON.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -49,9 +52,9 @@ def verify(
 
     hush(quiet or as_json)
     writable("--out", out)
-    report = check(
-        read(scenario, changes), deviations=deviations, starts=starts, seed=seed, bound=cast("Literal[0, 1, 2]", bound)
-    )
+    order = cast("Literal[0, 1, 2]", bound)
+    game = read(scenario, changes)
+    report = check(game, deviations=deviations, starts=starts, seed=seed, bound=order, turning=turning)
     if out is not None:
         write_whole(out, json.dumps(report.to_dict(), indent=2, allow_nan=False) + "\n")
     for line in report.lines():

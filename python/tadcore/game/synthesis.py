@@ -7,7 +7,13 @@ over what the network lets player i use, g_i = K_i 𝓘_i (eq:nwadapt), each K_i
     I2  Θ₂ = γ₁‖ΔQ‖² + γ₂‖S₂‖² + γ₃‖S₃‖²                     (eq:perfmatzsg)
 
 Norms are Frobenius norms of the reduced factors. The paper's matrices are these ⊗ I, so its Θ is dim times the one
-reported here; among scalars the minimiser is the same. `Gains.certified` tells where it is proved to be global.
+reported here; among scalars the minimiser is the same. `Gains.certified` tells where it is proved to be global among
+them.
+
+The scalars are a choice. The paper's K_i has blocks of dim × dim; a descent in blocks that begins at scalars stays in
+scalars, but blocks that turn, aI + bJ with J a quarter turn, can have a lower Θ, and with them their mirror images
+aI - bJ: the minimiser is then not unique. The library's gains are the lowest of those that commute with reflections.
+`Gains.certified_blocks` tells where no blocks have a lower Θ.
 
 A common factor of γ changes Θ alone: the gains are bitwise the same for γ and 2^k γ. Without weight on S (γ₄ = 0 in
 I1, γ₂ or γ₃ = 0 in I2) equal minima may differ, by the sign of a row at the least; the gains are then the limit of a
@@ -71,6 +77,9 @@ class Gains:
         player's parts.
     certified : bool
         Whether these gains are proved to be a global minimum of Θ among scalar gains, up to rounding.
+    certified_blocks : bool
+        Whether they are proved to be one among the paper's gains too, all blocks of dim × dim, those that turn
+        included. In I2 wherever `certified`. False says nothing: blocks need not do better there.
     start : {"canonical", "complex", "stacked", "reversed"}
         Starting point of the descent that found it: the canonical one, or a further one of the search.
     restarts_left_out : int
@@ -89,6 +98,7 @@ class Gains:
     status: str
     gradient_norm: float
     certified: bool
+    certified_blocks: bool
     start: Literal["canonical", "complex", "stacked", "reversed"]
     restarts_left_out: int = 0
 
@@ -167,6 +177,7 @@ def synthesize(
         status=core.status,
         gradient_norm=core.gradient_norm,
         certified=core.certified,
+        certified_blocks=core.certified_blocks,
         start=core.start,
         restarts_left_out=core.restarts_left_out,
     )

@@ -13,8 +13,9 @@ module                                       what it answers
 ``checks.consistency``                       full observation gives the equilibrium (thm:consistency); how far the
                                              indices are from the players' own
 ``checks.gains``, ``oracle.objective``       gradient, curvature in full blocks, other starts, share of certified gains
-``bound``                                    a lower bound on Θ by semidefinite programming, and the gap
-                                             (extra ``bounds``)
+``bound``                                    lower bounds on Θ and the gap: order one by semidefinite programming
+                                             (extra ``bounds``), order two by sums of squares, proved exactly
+``checks.turning``                           blocks that turn: how much lower Θ is along a game, and what it ends with
 ``checks.geometry``                          straight line (thm:straight_line), radius delay (thm:delayproperty),
                                              symmetries
 ``checks.steps``                             δ, δ/2, δ/4: what depends on the step
@@ -35,6 +36,7 @@ from tadcore.game.chattering import Chatter, chatter
 from tadcore.game.externality import control_jumps
 
 from .bound.bounds import ThetaBound, theta_bound
+from .bound.sampled import TableProof, prove_table
 from .checks.adapted_nash import check_nafne, gap_order, sampling_gap
 from .checks.consistency import check_consistency, index_distance
 from .checks.decentral import Decentralised, check_decentral, decentralise
@@ -43,6 +45,7 @@ from .checks.geometry import check_geometry, moved, off_the_line, radius_delay, 
 from .checks.nash import check_equilibrium, riccati_defect
 from .checks.record import check_record
 from .checks.steps import Refinement, StepStudy, check_steps, refine_batch, step_study
+from .checks.turning import TurningStudy, turning_study
 from .continuous.events import play_by_events
 from .continuous.plays import Event, EventPlay, Slide
 from .continuous.sliding import SlidingStudy, sliding_study
@@ -69,7 +72,9 @@ __all__ = [
     "Slide",
     "SlidingStudy",
     "StepStudy",
+    "TableProof",
     "ThetaBound",
+    "TurningStudy",
     "VerificationError",
     "VerificationReport",
     "adapted_weights",
@@ -93,6 +98,7 @@ __all__ = [
     "multistart",
     "off_the_line",
     "play_by_events",
+    "prove_table",
     "radius_delay",
     "refine_batch",
     "relabelled",
@@ -101,5 +107,6 @@ __all__ = [
     "sliding_study",
     "step_study",
     "theta_bound",
+    "turning_study",
     "verify",
 ]

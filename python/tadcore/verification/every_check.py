@@ -26,6 +26,7 @@ from .checks.geometry import check_geometry
 from .checks.nash import check_equilibrium
 from .checks.record import check_record, check_rows
 from .checks.steps import check_steps
+from .checks.turning import check_turning
 from .oracle.draws import as_seed
 from .report import Check, VerificationReport, combine, unresolved
 
@@ -41,6 +42,7 @@ def verify(
     starts: int = 0,
     seed: int = 0,
     bound: Literal[0, 1, 2] | bool = 0,
+    turning: int = 0,
 ) -> VerificationReport:
     """Check the paper's theorems on a scenario or on a run.
 
@@ -61,6 +63,10 @@ def verify(
         instants, in milliseconds each; needs Clarabel, the extra ``bounds``. 2: at every instant, each bound proved in
         exact arithmetic; the paper's runs take minutes, and an instant at which more than 9 unknowns do not decouple
         is counted as not tried.
+    turning : int
+        Descents in gains that turn, aI + bJ, at each instant of a run in the plane at which no certificate covers them;
+        none by default, since they take minutes. Their gap to the scalar gains is measured, and where there is one the
+        game is played with them, too.
 
     Returns
     -------
@@ -91,6 +97,7 @@ def verify(
     instants = as_index("instants", instants, _MOST)
     starts = as_index("starts", starts, _MOST)
     seed = as_seed(seed)
+    turning = as_index("turning", turning, _MOST)
     if not isinstance(bound, int | np.integer) or bound not in (0, 1, 2):
         raise ScenarioError("bound", bound, "0, 1 or 2: the order of the relaxation")
     order = int(bound)
@@ -146,6 +153,7 @@ def verify(
             "gains",
             lambda: check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed, bound=order),
         ),
+        *([family("turning", lambda: check_turning(run, starts=turning, seed=seed))] if turning else []),
         family("geometry", lambda: check_geometry(run, seed=seed)),
         family("decentral", lambda: check_decentral(run)),
     ]

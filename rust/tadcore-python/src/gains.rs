@@ -13,12 +13,13 @@ use super::guard::guarded;
 pub(crate) struct Gains {
     gains: CoreGains,
     terms: Vec<f64>,
+    certified_blocks: bool,
     topology: Topology,
 }
 
 impl Gains {
-    pub(crate) fn new(gains: CoreGains, terms: Vec<f64>, topology: Topology) -> Self {
-        Self { gains, terms, topology }
+    pub(crate) fn new(gains: CoreGains, terms: Vec<f64>, certified_blocks: bool, topology: Topology) -> Self {
+        Self { gains, terms, certified_blocks, topology }
     }
 }
 
@@ -73,10 +74,16 @@ impl Gains {
         self.gains.status.name()
     }
 
-    /// Whether the minimum is proved to be global.
+    /// Whether the minimum is proved to be global among scalar gains.
     #[getter]
     fn certified(&self) -> bool {
         self.gains.certified
+    }
+
+    /// Whether it is proved to be global among the paper's gains in blocks.
+    #[getter]
+    fn certified_blocks(&self) -> bool {
+        self.certified_blocks
     }
 
     /// Restarts that promised to lead lower, beyond those made: in large games their number is limited.

@@ -183,15 +183,16 @@ impl Game {
             }
             let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
             let policy = self.policy(py)?;
-            let (gains, terms) = detach::interruptible(py, |cancel| {
+            let (gains, terms, blocks) = detach::interruptible(py, |cancel| {
                 let (mut solver, problem) = (Synthesizer::new(), policy.problem(step, cancel)?);
                 solver.watch(cancel);
                 let gains = policy.gains(&problem, &topology, options, &mut solver)?;
                 let terms = problem.terms(policy.equilibrium().node(step), &gains.rows, cancel)?;
-                Ok((gains, terms))
+                let blocks = gains.certified_blocks(&problem, &topology, cancel)?;
+                Ok((gains, terms, blocks))
             })?
             .map_err(|stopped| errors::stopped(py, stopped))?;
-            Ok(Gains::new(gains, terms, topology))
+            Ok(Gains::new(gains, terms, blocks, topology))
         })
     }
 

@@ -212,3 +212,42 @@ def test_what_it_cannot_do_is_refused():
     more = sc.replace({"defenders": [*sc.defenders, sc.defenders[0].model_copy(update={"position": (2.0, 2.0)})]})
     with pytest.raises(tadcore.ScenarioError, match="16 unknowns that do not decouple"):
         v.theta_bound(more, step=0, adjacency=[[1, 1, 1, 1, 0]] * 4, order=2)
+
+
+def test_sampled_entries_of_a_table_bound_the_share_that_is_not_proved():
+    sc = short_sighted(0.1)
+    table = v.prove_table(sc, trials=4, entries=30, most=4, seed=3, progress=False)
+    assert (table.trials, table.entries, table.missed, table.open) == (4, 30, (), 0)
+    assert table.tried == table.proved > 20
+    low, high = table.interval
+    assert low == 0.0
+    assert high == pytest.approx(1.0 - 0.025 ** (1.0 / table.tried), rel=1e-9)  # of a binomial without a failure
+    assert f"at most {100 * high:.3g} %" in repr(table)
+    assert "95 % confidence" in table._repr_html_()
+    assert v.prove_table(sc, trials=4, entries=30, most=4, seed=3, progress=False) == table
+    few = v.prove_table(sc, trials=1, entries=1000, most=4, seed=3, progress=False)
+    assert few.entries == few.visited < 1000
+    assert few.interval == (0.0, 0.0)
+    assert "all of them sampled" in repr(few)
+
+
+def test_an_entry_that_the_search_missed_is_named(monkeypatch):
+    """Gains of a worse minimum, as a search that fails would give them."""
+
+    def worse(sc, *, step, adjacency):
+        found = tadcore.synthesize(sc, step=step, adjacency=adjacency)
+        return replace(found, rows=0.0 * found.rows)
+
+    monkeypatch.setattr("tadcore.verification.bound.sampled.synthesize", worse)
+    table = v.prove_table(short_sighted(0.1), trials=3, entries=20, most=4, seed=3, progress=False)
+    assert table.missed
+    assert table.proved + len(table.missed) + table.open == table.tried
+    assert table.missed[0].bound.lower is not None
+    assert "missed at k" in table._repr_html_()
+    assert table.interval[0] > 0.0
+
+
+@pytest.mark.parametrize("bad", [{"trials": 0}, {"entries": 0}, {"most": 15}, {"level": 1.0}, {"half_width": 0.0}])
+def test_a_table_is_not_begun_with_arguments_out_of_range(bad):
+    with pytest.raises(tadcore.ScenarioError, match=next(iter(bad))):
+        v.prove_table("paper-i1", **bad)

@@ -98,7 +98,7 @@ pub struct Gains {
     pub iterations: usize,
     /// How the descent that won ended.
     pub status: Status,
-    /// Whether the minimum is proved to be global.
+    /// Whether the minimum is proved to be global among scalar gains.
     pub certified: bool,
     /// The start whose descent won.
     pub start: Start,
@@ -117,6 +117,23 @@ impl Gains {
             k[i * n + i] = if topology.sees_attacker(i) { row.iter().sum() } else { 0.0 };
         }
         k
+    }
+
+    /// Whether the minimum is proved to be global among the paper's gains, blocks of dim × dim, those that turn included.
+    ///
+    /// # Errors
+    /// [`Stopped`] when there is no memory for so many unknowns, or `cancel` was raised.
+    pub fn certified_blocks(
+        &self,
+        problem: &Problem,
+        topology: &Topology,
+        cancel: &CancelToken,
+    ) -> Result<bool, Stopped> {
+        if !self.certified {
+            return Ok(false);
+        }
+        let variables = search::variables(topology, problem.criterion)?;
+        search::covers_blocks(problem, &self.rows, &variables, cancel)
     }
 }
 

@@ -29,6 +29,7 @@
 //! | module | what it knows |
 //! |---|---|
 //! | `start` | the canonical start and the variables that a network leaves free |
+//! | `blocks` | whether a certificate covers the paper's gains in blocks |
 //! | `candidate` | a network that is being solved, and the best gains found so far |
 //! | `dispatch` | a list of descents made as wide as the processor allows |
 //! | `gradient` | the paper's gradient descent, as a second method |
@@ -38,6 +39,7 @@
 //! | `refine` | the end of the search where players differ by decades |
 //! | `settle` | the search where S has next to no weight, and which of equal minima is taken where it has none |
 
+mod blocks;
 mod candidate;
 mod gradient;
 mod large;
@@ -47,6 +49,7 @@ mod settle;
 mod stages;
 mod start;
 
+pub(crate) use blocks::covers_blocks;
 pub(crate) use candidate::Candidate;
 pub use candidate::Start;
 #[cfg(test)]
