@@ -42,6 +42,7 @@ WRITERS = {
     "b.html": lambda path: report(study().run(), path),
     "c.png": lambda path: a_map().save(path),
     "d.nc": lambda path: a_map().save(path),
+    "d2.nc": lambda path: tadcore.certified_map(short(), x=(-3, 3), y=(-3, 3), resolution=0.5).save(path),
     "e.svg": lambda path: save_figure(Figure(), path.with_suffix(""), formats=["svg"]),
     "f.gif": lambda path: tadcore.simulate(short()).animate(seconds=0.2, fps=5, width=2).save(path),
     "g.html": lambda path: tadcore.simulate(short()).animate(seconds=0.2, fps=5, width=2).save(path),
