@@ -69,7 +69,9 @@ test: test-rust test-python  ## run every test, Rust and Python
 test-rust:
 	cargo test --release --locked --package tadcore --package tadcore-kernels --package tadcore-python
 
-# Two halves side by side, of about the same length.
+# Two halves side by side, of about the same length; with one thread of BLAS each, or they get in each other's way.
+test-games test-rest: export OPENBLAS_NUM_THREADS := 1
+test-games test-rest: export OMP_NUM_THREADS := 1
 GAMES := $(addprefix tests/python/,study simulation verification analysis report)
 test-python: setup
 	@$(MAKE) --silent --jobs=2 test-games test-rest
