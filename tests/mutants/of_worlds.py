@@ -5,10 +5,12 @@ MUTANTS = {
         ("Philox: which key", "[p1 >> 32 ^ x[1] ^ «key[0]»", "key[1]"),
         ("Philox: halves", "p0 >> 32 ^ «x[3]»", "x[1]"),
         ("uniform: the middle of an interval", "- («1.0 - f64::EPSILON / 2.0»)", "1.0"),
-        ("uniform, many: B", "uniform(«words[3] << 32 | words[2] & 0xFFFF_FFFF»)", "words[1] << 32 | words[0]"),
+        ("uniform, many: B", "[(words[1], words[0]), («words[3], words[2]»)]", "words[1], words[0]"),
+        ("Philox, many: the second round", "low(p) ^ «keys[1][1]»", "keys[1][0]"),
+        ("Philox, many: trials beyond 2³²", "if «!self.alike»", "false"),
     ],
     "random/mod.rs": [
-        ("draws: a trial beyond 2³²", "purpose.code() << 24 | «(trial >> 32) as u32»", "0"),
+        ("draws: a trial beyond 2³²", "bits | «(self.trial >> 32) as u32»", "0"),
         ("draws: the key", "[seed as u32, «(seed >> 32) as u32»]", "0"),
         ("draws: a pair of axes", "«4 + u32::from(pair)»", "4"),
     ],
@@ -18,9 +20,9 @@ MUTANTS = {
         ("normal: far tail", "(&FAR, «root - 5.0»)", "root - 1.6"),
         ("normal: which tail", "libm::log(if «q < 0.0» {", "q > 0.0"),
         ("normal: sign", "if «q < 0.0» { -size }", "q > 0.0"),
-        ("normal, many: which tail", "tails[count] = if «u < 0.5»", "u > 0.5"),
-        ("normal, many: near tail", "let r = «*root - 1.6»", "*root + 1.6"),
-        ("normal, many: far tails", "if «largest <= 5.0»", "largest <= 50.0"),
+        ("normal, many: which tail", "select(«x.less(V::Eight::splat(0.0))», V", "V::Eight::splat(0.0).less(x)"),
+        ("normal, many: near tail", "(-ln(*p)).sqrt() «- 1.6»", "+ 1.6"),
+        ("normal, many: far tails", "if «V::Eight::bits(V::Eight::splat(NOT_FAR).less(most)) == 0»", "true"),
         ("ln: halves", "s * («half + (odd + even)»)", "half - (odd + even)"),
     ],
     "random/chain.rs": [
@@ -53,19 +55,29 @@ MUTANTS = {
         ("disturbance: s = ς √δ", "map(|sigma| «sigma * step.sqrt()»)", "sigma * step"),
     ],
     "ensemble/noise.rs": [
-        ("batches: disturbance of the attacker", "(«V::Eight::load(by) - V::Eight::load(own)»)", "V::Eight::load(by)"),
+        (
+            "batches: disturbance of the attacker",
+            "let by = V::Eight::load(&by[at..]) «- V::Eight::load(&own[at..])»",
+            "+ V::Eight::load(&own[at..])",
+        ),
     ],
     "ensemble/network.rs": [
-        ("batches: mask", "«key[l] &= up[l];»", "key[l] |= up[l];"),
-        ("batches: links that are up", "«heard[l] &= up[l];»", "heard[l] |= up[l];"),
+        ("batches: mask", "«words[l] &= up[l];»", "words[l] |= up[l];"),
+        ("batches: edges in registers", "if let Some(up) = «self.edges».get(block)", "self.sensors"),
+        ("batches: links that are up, in registers", "if let Some(up) = relay.up.get(«block»)", "0"),
+        ("batches: what is told but not known", "if «first & second & ALL != ALL»", "first | second == 0"),
         ("batches: what was told before", "«differs[l] |= last[l] ^ now[l];»", "differs[l] &= last[l] ^ now[l];"),
-        ("batches: radius of a speaker before", "1 << («i * m + j»), d2", "j * m + i"),
+        ("batches: radius of a speaker before", "1 << (shift + «here»), d2", "there"),
     ],
     "ensemble/fates.rs": [
-        (
-            "batches: when something flips",
-            "if «due.iter().fold(NEVER, |least, &due| least.min(due)) > k»",
-            "due[0] > k",
-        ),
+        ("batches: who is over", "if «place == GONE»", "false"),
+        ("batches: bits of a sensor", "«i * shape.size..(i + 1) * shape.size»", "i * shape.size..i * shape.size + 1"),
+    ],
+    "ensemble/flips.rs": [
+        ("batches: number of a flip", "let index = «entry.state / 2 + 1»", "entry.state / 2"),
+        ("batches: holding time", "«steps as i32 + 1»", "steps as i32"),
+    ],
+    "ensemble/agenda.rs": [
+        ("batches: the piece before", "self.steps[step] = «taken.before»", "NONE"),
     ],
 }

@@ -10,6 +10,7 @@
 use super::anysize::sweep_any;
 use super::block::{BLOCK, Blocks, Keys, PerTrial, Shape, Stop, Sweep, playing};
 use super::eight::{distance, norm};
+use super::network::{Network, link};
 use crate::policy::index::DIRECT_BITS;
 use crate::policy::step_table::StepTable;
 use crate::simd::{Number, Simd, Width, dispatch};
@@ -39,13 +40,15 @@ macro_rules! unrolled {
 
 // No closures below: they are functions of their own, and the compiler would not inline the wide instructions into them.
 
-/// The keys of one block, and a bit for each trial in which somebody is caught or far off.
+/// The keys of one block, and a bit for each trial in which somebody is caught or far off. With H, links within `reach`
+/// come after the edges.
 #[inline(always)]
-pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
+pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize, const H: bool>(
     z: &[PerTrial],
     sight: &[PerTrial],
     capture: &[PerTrial],
     far: &PerTrial,
+    reach: &[f64],
 ) -> (V::Keys, u8) {
     let mut keys = V::no_keys();
     let mut caught = 0;
@@ -64,6 +67,10 @@ pub fn observe<V: Simd, const N: usize, const M: usize, const D: usize>(
                 keys = V::set(keys, 1 << (I * N + J), d2.at_most(V::Eight::load(&sight[I])));
             }
             keys = V::set(keys, 1 << (J * N + I), d2.at_most(V::Eight::load(&sight[J])));
+            if H && I < M {
+                keys = V::set(keys, 1 << (N * M + link(M, I, J)), d2.at_most(V::Eight::splat(reach[J])));
+                keys = V::set(keys, 1 << (N * M + link(M, J, I)), d2.at_most(V::Eight::splat(reach[I])));
+            }
         });
     });
     (keys, caught | !(V::Eight::bits(most.at_most(V::Eight::load(far))) as u8))
@@ -139,15 +146,25 @@ fn look_up<V: Simd, const N: usize, const M: usize>(
     all
 }
 
+/// What comes between sight and network: nothing, or what is called block by block; what stays in registers; and that with
+/// distances of links.
+const CALLED: usize = 0;
+const IN_REGISTERS: usize = 1;
+const WITH_REACHES: usize = 2;
+
 /// One step of the blocks from one on, as far as they can move: a [`Sweep`].
 #[inline(always)]
-fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize>(
+fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize, const W: usize>(
     blocks: &mut Blocks,
     from: usize,
     table: &StepTable,
     next: Option<&StepTable>,
     keys: &mut Keys,
 ) -> Stop {
+    let reach: [f64; M] = match &blocks.network {
+        Some(network) if W == WITH_REACHES => *network.reach().first_chunk().unwrap_or(&[-1.0; M]),
+        _ => [-1.0; M],
+    };
     let matrices = table.matrices().as_chunks().0.as_chunks().0;
     let places = 1 << if N * M <= DIRECT_BITS { N * M } else { 0 };
     let direct = table.direct().get(..places).unwrap_or(&NOTHING[..places]);
@@ -170,7 +187,12 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
             let block = first + ready;
             let sight = &blocks.sight[block * blocks.sight_step..][..M];
             let capture = &blocks.capture[block * blocks.capture_step..][..N];
-            let (mut seen, over) = observe::<V, N, M, D>(z, sight, capture, &blocks.far[block]);
+            let far = &blocks.far[block];
+            let (mut seen, over) = if W == WITH_REACHES {
+                observe::<V, N, M, D, true>(z, sight, capture, far, &reach)
+            } else {
+                observe::<V, N, M, D, false>(z, sight, capture, far, &reach)
+            };
             if over != 0 {
                 let over = u32::from(over) & playing(blocks.live, block);
                 if over != 0 {
@@ -179,12 +201,19 @@ fn sweep<V: Simd, const N: usize, const M: usize, const D: usize, const Q: usize
                 }
             }
             if let Some(network) = &mut blocks.network {
-                keys[0] = V::keys(seen);
-                network.apply(block, z, keys);
-                seen = V::load_keys(&keys[0]);
+                if W == CALLED {
+                    keys[0] = V::keys(seen);
+                    network.apply(block, z, keys);
+                    seen = V::load_keys(&keys[0]);
+                } else {
+                    seen = network.in_force::<V>(block, seen);
+                }
             }
             if !look_up::<V, N, M>(seen, direct, table, slots) {
                 keys[0] = V::keys(seen);
+                if W != CALLED {
+                    Network::plain(&mut keys[0]);
+                }
                 stop = Stop::Missing(block);
                 break;
             }
@@ -212,7 +241,7 @@ dispatch! {
         keys: &mut Keys,
     ) -> Stop {
         if const { V::SIZED } {
-            sweep::<V, N, M, D, Q, E>(blocks, from, table, next, keys)
+            sweep::<V, N, M, D, Q, E, CALLED>(blocks, from, table, next, keys)
         } else {
             // All widths agree bitwise: where loops are slow anyway, one version for all sizes will do.
             sweep_any(Width::Baseline, shape, blocks, from, table, next, keys)
@@ -220,10 +249,44 @@ dispatch! {
     }
 }
 
-/// The sweep for a shape: compiled for N ≤ 8 in the plane and in space, one version for all else.
+dispatch! {
+    /// The same with a network in registers: a function of its own, so that the other stays as it is without worlds.
+    fn sized_in_world<V, const N: usize, const M: usize, const D: usize, const Q: usize, const E: usize, const W: usize>(
+        shape: &Shape,
+        blocks: &mut Blocks,
+        from: usize,
+        table: &StepTable,
+        next: Option<&StepTable>,
+        keys: &mut Keys,
+    ) -> Stop {
+        if const { V::SIZED } {
+            sweep::<V, N, M, D, Q, E, W>(blocks, from, table, next, keys)
+        } else {
+            sweep_any(Width::Baseline, shape, blocks, from, table, next, keys)
+        }
+    }
+}
+
+/// The sweep for a shape, and for what comes between sight and network: compiled for N ≤ 8 in the plane and in space, one
+/// version for all else.
 // Inlined, it would have every version compiled once more where it is called.
 #[inline(never)]
-pub fn sweep_of(shape: &Shape) -> Sweep {
+pub fn sweep_of(shape: &Shape, network: Option<&Network>) -> Sweep {
+    macro_rules! in_registers {
+        ($w:ident: $($n:literal $m:literal;)*) => {
+            match (shape.size, shape.rows, shape.dim) {
+                $(($n, $m, 2) => return sized_in_world::<$n, $m, 2, 1, $n, $w>,
+                  ($n, $m, 3) => return sized_in_world::<$n, $m, 3, 1, $n, $w>,)*
+                _ => {}
+            }
+        };
+    }
+    // Keys that are their own index, of teams of more than one.
+    match network.filter(|network| network.in_registers()) {
+        Some(network) if network.reach().is_empty() => in_registers!(IN_REGISTERS: 2 2; 3 2; 3 3; 4 3;),
+        Some(_) => in_registers!(WITH_REACHES: 2 2; 3 2; 3 3; 4 3;),
+        None => {}
+    }
     macro_rules! choose {
         ($($n:literal $m:literal $q:literal;)*) => {
             match (shape.size, shape.rows, shape.dim) {

@@ -37,6 +37,71 @@ pub trait Simd: Copy {
     fn load_keys(keys: &[u64; 8]) -> Self::Keys;
     /// The low 16 bits of each key, four in a word.
     fn low(keys: Self::Keys) -> [u64; 2];
+    /// The bits that are in both.
+    #[inline(always)]
+    fn both(keys: Self::Keys, others: Self::Keys) -> Self::Keys {
+        let (keys, others) = (Self::keys(keys), Self::keys(others));
+        Self::load_keys(&std::array::from_fn(|l| keys[l] & others[l]))
+    }
+    /// What a table says of each key.
+    #[inline(always)]
+    fn entries(table: &Entries, keys: Self::Keys) -> Self::Keys {
+        Self::load_keys(&Self::keys(keys).map(|key| u64::from(table.get(key))))
+    }
+    /// Writes the numbers in the lanes of `bits` to the front of a slice of eight, in order; anything after them.
+    #[inline(always)]
+    fn compress(eight: Self::Eight, bits: u16, to: &mut [f64]) {
+        let (mut numbers, mut at) = ([0.0; 8], 0);
+        eight.store(&mut numbers);
+        for (l, &x) in numbers.iter().enumerate() {
+            to[at] = x;
+            at += usize::from(bits >> l & 1);
+        }
+    }
+    /// The first numbers of a slice of eight in the lanes of `bits`, in order; anything in the others.
+    #[inline(always)]
+    fn expand(from: &[f64], bits: u16) -> Self::Eight {
+        let (mut numbers, mut at) = ([0.0; 8], 0);
+        for (l, x) in numbers.iter_mut().enumerate() {
+            *x = from[at];
+            at += usize::from(bits >> l & 1);
+        }
+        Self::Eight::load(&numbers)
+    }
+}
+
+/// A table of words of 16 bits by keys of so many bits; 0 where nothing is known.
+pub struct Entries {
+    /// One more than there are keys: wide instructions read 32 bits at a time.
+    words: Vec<u16>,
+    last: u64,
+}
+
+impl Entries {
+    /// Nothing is known of any key of `bits` bits.
+    #[must_use]
+    pub fn new(bits: usize) -> Self {
+        Self { words: vec![0; (1 << bits) + 1], last: (1 << bits) - 1 }
+    }
+    /// The largest key.
+    #[inline(always)]
+    pub fn last(&self) -> u64 {
+        self.last
+    }
+    /// The words, one more than there are keys.
+    #[inline(always)]
+    pub fn words(&self) -> &[u16] {
+        &self.words
+    }
+    /// The word of a key.
+    #[inline(always)]
+    pub fn get(&self, key: u64) -> u16 {
+        self.words[(key & self.last) as usize]
+    }
+    /// Sets it.
+    pub fn set(&mut self, key: u64, word: u16) {
+        self.words[(key & self.last) as usize] = word;
+    }
 }
 
 /// What the target guarantees: numbers one by one, or the registers of NEON.

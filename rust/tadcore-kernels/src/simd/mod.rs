@@ -33,7 +33,7 @@ mod x86;
 
 pub use aligned::{Aligned, prefetch};
 pub use dispatch::{dispatch, widened};
-pub use instructions::{Baseline, Simd};
+pub use instructions::{Baseline, Entries, Simd};
 pub use number::{Number, Scalar, dot, dot_in_order, norm, sum_of_squares, take};
 pub use width::Width;
 pub use width::in_use;

@@ -65,7 +65,7 @@ impl<'a> Chunk<'a> {
         width: Width,
     ) -> Result<Self, NoMemory> {
         let trials = Trials::new(policy, batch, played, first, trials, width)?;
-        Ok(Self { sweep: sweep_of(&trials.shape), trials, width })
+        Ok(Self { sweep: sweep_of(&trials.shape, trials.blocks.network.as_deref()), trials, width })
     }
 
     /// Plays every trial to its end.

@@ -1,18 +1,19 @@
 //! What a world does to the trials of a chunk: what fails, who is told, who is shaken; the draws of recorded runs.
 //!
-//! A trial's chains stay with its number; the masks stand in its place, beside its state. Between flips nothing is done
-//! but to compare: every place knows the step of its next.
+//! A trial's chains stay with its number; the masks stand in its place, beside its state. A chain is touched at its flips
+//! alone: the [`Agenda`] has each under the step of its next, and the flips of a step are drawn side by side.
 
+use super::agenda::Agenda;
 use super::block::{BLOCK, Shape};
+use super::flips::Flips;
 use super::noise::Noise;
 use crate::error::NoMemory;
-use crate::memory::{MOST_BYTES, grow, reserve_exact, within};
-use crate::network::{Links, Topology, observe};
-use crate::random::{Draws, NEVER, Walk};
+use crate::memory::{MOST_BYTES, reserve_exact, within};
+use crate::network::{Failures, Kind, Links, Topology, observe};
 use crate::simd::Width;
 use crate::simulation::{Chances, Conditions};
 use tadcore_kernels::ensemble::block::Blocks;
-use tadcore_kernels::ensemble::network::{Network, Relay, Rule, Words};
+use tadcore_kernels::ensemble::network::{Network, Relay, Rule, Words, link};
 
 /// What asks for memory here.
 const WHAT: &str = "what fails and who is told in the trials of a batch";
@@ -27,17 +28,73 @@ pub(super) struct Played<'a> {
 /// What happens to the trials of a chunk.
 pub(super) struct Fates<'a> {
     conditions: &'a Conditions,
-    chances: Chances<'a>,
-    /// How many trials of the batch come before the chunk.
+    /// How many trials come before the chunk, from trial 0 on.
     first: u64,
     shape: Shape,
-    /// Edges and links, all up.
-    all_up: (Topology, Topology),
-    /// The chains of each trial.
-    walks: Vec<Walk>,
-    /// The step of the next flip in each place.
-    due: Vec<i32>,
+    failing: Option<Failing>,
     noise: Option<Noise>,
+}
+
+/// What fails, and when.
+struct Failing {
+    /// What the flip of a chain changes.
+    targets: Vec<Target>,
+    flips: Flips,
+    agenda: Agenda,
+    /// Where each trial of the chunk stands; [`GONE`] where it is over.
+    places: Vec<u32>,
+}
+
+/// The place of a trial that is over.
+const GONE: u32 = u32::MAX;
+
+/// What the flip of a chain changes: bits of words, mostly of one.
+struct Target {
+    part: Part,
+    words: Vec<(usize, u64)>,
+}
+
+/// Which of a network's masks.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Sensors,
+    Edges,
+    Links,
+}
+
+impl Target {
+    fn new(kind: Kind, shape: &Shape) -> Self {
+        let (part, bits) = match kind {
+            Kind::Sensor(i) => (Part::Sensors, i * shape.size..(i + 1) * shape.size),
+            Kind::Edge(i, j) => (Part::Edges, i * shape.size + j..i * shape.size + j + 1),
+            Kind::Link(i, j) => {
+                let bit = Relay::shift(shape) + link(shape.rows, i, j);
+                (Part::Links, bit..bit + 1)
+            }
+        };
+        let mut words: Vec<(usize, u64)> = Vec::new();
+        for bit in bits {
+            match words.last_mut().filter(|(word, _)| *word == bit / 64) {
+                Some((_, mask)) => *mask |= 1 << (bit % 64),
+                None => words.push((bit / 64, 1 << (bit % 64))),
+            }
+        }
+        Self { part, words }
+    }
+
+    /// Changes its bits in one place.
+    #[inline]
+    fn flip(&self, place: usize, network: &mut Network, shape: &Shape) {
+        let (all, count) = match (self.part, &mut network.relay) {
+            (Part::Sensors, _) => (&mut network.sensors, shape.words),
+            (Part::Edges, _) => (&mut network.edges, shape.words),
+            (Part::Links, Some(relay)) => (&mut relay.up, Relay::words(shape.rows)),
+            (Part::Links, None) => return,
+        };
+        for &(word, mask) in &self.words {
+            all[place / BLOCK * count + word][place % BLOCK] ^= mask;
+        }
+    }
 }
 
 /// The links of a team as the rule of a relay.
@@ -47,10 +104,15 @@ struct Told {
     size: usize,
 }
 
+/// Who hears whom, by the bits of links.
+fn listened(rows: usize, words: &[u64], shift: usize) -> Topology {
+    let bit = |i: usize, j: usize| shift + link(rows, i, j);
+    Topology::from_fn(rows, rows, |i, j| i != j && words[bit(i, j) / 64] >> (bit(i, j) % 64) & 1 == 1)
+}
+
 impl Rule for Told {
     fn told(&mut self, seen: &[u64], heard: &[u64], told: &mut [u64]) {
-        let (seen, heard) =
-            (Topology::from_words(self.rows, self.size, seen), Topology::from_words(self.rows, self.rows, heard));
+        let (seen, heard) = (Topology::from_words(self.rows, self.size, seen), listened(self.rows, heard, 0));
         told.copy_from_slice(self.links.told(&seen, &heard).words());
     }
 }
@@ -63,138 +125,123 @@ impl<'a> Fates<'a> {
     pub(super) fn new(
         played: &Played<'a>,
         first: usize,
-        who: &[u32],
+        trials: usize,
+        steps: usize,
         shape: Shape,
         width: Width,
         blocks: &mut Blocks,
     ) -> Result<Self, NoMemory> {
         let Played { conditions, chances } = *played;
-        let failures = &conditions.failures;
+        let first = chances.trial + first as u64;
         let count = blocks.far.len();
-        let edges = Topology::complete(shape.rows, shape.size);
-        let links = Topology::from_fn(shape.rows, shape.rows, |i, j| i != j);
-        let chains = who.len() * failures.len();
-        // A relay keeps the words of what was seen, heard and told last, too: asked for here, and given back.
-        let all = size_of::<Words>() * count * (3 * edges.words().len() + 2 * links.words().len());
-        within(WHAT, (chains * size_of::<Walk>() + all) as u128, MOST_BYTES)?;
+        let failures = &conditions.failures;
+        // Masks, what was seen, heard and told last, and the agenda: asked for here together, and given back.
+        let words = 4 * shape.words + 3 * Relay::words(shape.rows);
+        let agenda = if failures.is_empty() { 0 } else { Agenda::bytes(trials * failures.len(), steps) };
+        let all = size_of::<Words>() * count * words + agenda;
+        within(WHAT, all as u128, MOST_BYTES)?;
         reserve_exact(WHAT, &mut Vec::<u8>::new(), all)?;
-        let words = |all: &Topology| -> Result<Vec<Words>, NoMemory> {
-            let mut list = Vec::new();
-            reserve_exact(WHAT, &mut list, count * all.words().len())?;
-            for _ in 0..count {
-                list.extend(all.words().iter().map(|&word| [word; BLOCK]));
+        let relay = conditions.links.as_ref().map(|talk| {
+            let rule = Box::new(Told { links: talk.clone(), rows: shape.rows, size: shape.size });
+            Relay::new(&shape, talk.reach(), count, rule)
+        });
+        let mut failing = None;
+        if relay.is_some() || !failures.is_empty() {
+            let mut network = Box::new(Network::new(width, shape, relay));
+            if !failures.is_empty() {
+                failing = Some(Failing::new(failures, chances.seed, first, trials, steps, &shape, width, &mut network));
             }
-            Ok(list)
-        };
-        let relay = match &conditions.links {
-            None => None,
-            Some(talk) => {
-                let rule = Box::new(Told { links: talk.clone(), rows: shape.rows, size: shape.size });
-                Some(Relay::new(&shape, talk.reach(), count, words(&links)?, rule))
-            }
-        };
-        let up = if failures.blind() { words(&edges)? } else { Vec::new() };
-        blocks.network = (relay.is_some() || !up.is_empty()).then(|| Box::new(Network::new(width, shape, up, relay)));
-        let (mut walks, mut due) = (Vec::new(), Vec::new());
-        grow(WHAT, &mut walks, chains, Walk::default())?;
-        grow(WHAT, &mut due, count * BLOCK, NEVER)?;
-        let mut fates = Self {
-            conditions,
-            chances,
-            first: first as u64,
-            shape,
-            all_up: (edges, links),
-            walks,
-            due,
-            noise: conditions.spread.as_ref().map(|spread| Noise::new(spread, shape, chances.seed, width)),
-        };
-        for (place, &trial) in who.iter().enumerate() {
-            let draws = fates.draws(trial);
-            fates.due[place] = failures.begin(&draws, fates.own(trial));
-            fates.write(place, trial, blocks);
+            blocks.network = Some(network);
         }
-        Ok(fates)
+        let noise = conditions.spread.as_ref().map(|spread| Noise::new(spread, shape, chances.seed, width));
+        Ok(Self { conditions, first, shape, failing, noise })
     }
 
-    fn draws(&self, trial: u32) -> Draws {
-        self.chances.draws(self.first + u64::from(trial))
+    /// Moves what fails on to step k; whether anything may have changed in the last block.
+    pub(super) fn fail(&mut self, k: usize, blocks: &mut Blocks) -> bool {
+        let live = blocks.live;
+        let (Some(failing), Some(network)) = (&mut self.failing, &mut blocks.network) else { return false };
+        failing.advance(k, live, network, &self.shape)
     }
 
-    /// The chains of one trial.
-    fn own(&mut self, trial: u32) -> &mut [Walk] {
-        let chains = self.conditions.failures.len();
-        &mut self.walks[trial as usize * chains..][..chains]
-    }
-
-    /// Moves what fails on to step k; whether anything changed in the last block.
-    pub(super) fn fail(&mut self, k: usize, who: &[u32], blocks: &mut Blocks) -> bool {
-        let (k, live) = (k as i32, blocks.live);
-        let mut last = false;
-        for block in 0..live.div_ceil(BLOCK) {
-            let due = &self.due[block * BLOCK..][..BLOCK];
-            if due.iter().fold(NEVER, |least, &due| least.min(due)) > k {
-                continue;
-            }
-            for place in block * BLOCK..live.min((block + 1) * BLOCK) {
-                if self.due[place] <= k {
-                    let (draws, failures) = (self.draws(who[place]), &self.conditions.failures);
-                    self.due[place] = failures.advance(&draws, k, self.own(who[place]));
-                    self.write(place, who[place], blocks);
-                    last = block == live / BLOCK;
-                }
-            }
+    /// The trial `gone` is over; the trial `last` moves to the place that it had.
+    pub(super) fn moved(&mut self, gone: u32, last: u32, place: usize) {
+        if let Some(failing) = &mut self.failing {
+            failing.places[last as usize] = place as u32;
+            failing.places[gone as usize] = GONE;
         }
-        last
-    }
-
-    /// Writes what is up for a trial beside its state.
-    fn write(&mut self, place: usize, trial: u32, blocks: &mut Blocks) {
-        let Some(network) = blocks.network.as_mut().filter(|_| !self.conditions.failures.is_empty()) else { return };
-        let (mut edges, mut links) = self.all_up.clone();
-        let failures = &self.conditions.failures;
-        let chains = failures.len();
-        failures.mask(&self.walks[trial as usize * chains..][..chains], &mut edges, &mut links);
-        let relay = network.relay.as_mut().map(|relay| (&mut relay.up, links.words()));
-        for (all, words) in
-            relay.into_iter().chain([(&mut network.up, edges.words())]).filter(|(all, _)| !all.is_empty())
-        {
-            for (w, &word) in words.iter().enumerate() {
-                all[place / BLOCK * words.len() + w][place % BLOCK] = word;
-            }
-        }
-    }
-
-    /// The trial in the last place moves to another one.
-    pub(super) fn copy(&mut self, from: usize, to: usize) {
-        self.due[to] = self.due[from];
     }
 
     /// Shakes all trials after the step from t_k.
     pub(super) fn shake(&mut self, k: usize, who: &[u32], blocks: &mut Blocks) {
         if let Some(noise) = &mut self.noise {
-            noise.add(k, self.chances.trial + self.first, who, blocks);
+            noise.add(k, self.first, who, blocks);
         }
     }
 
     /// The network in force in one place, at the state `z`, with squared visibility radii `sight`.
     pub(super) fn network(&self, place: usize, z: &[f64], sight: &[f64], blocks: &Blocks) -> Topology {
-        let Shape { rows, size, dim, .. } = self.shape;
-        let of = |all: &[Words], rows: usize, size: usize| {
-            let count = (rows * size).div_ceil(64);
-            let words: Vec<u64> =
-                all[place / BLOCK * count..][..count].iter().map(|word| word[place % BLOCK]).collect();
-            Topology::from_words(rows, size, &words)
+        let Shape { rows, size, dim, words } = self.shape;
+        let of = |all: &[Words], count: usize| -> Vec<u64> {
+            all[place / BLOCK * count..][..count].iter().map(|word| word[place % BLOCK]).collect()
         };
         let mut seen = Topology::empty(rows, size);
         observe(z, dim, sight, &mut seen);
         let Some(network) = &blocks.network else { return seen };
-        if !network.up.is_empty() {
-            seen.keep(&of(&network.up, rows, size));
+        for up in [&network.sensors, &network.edges].into_iter().filter(|up| !up.is_empty()) {
+            seen.keep(&Topology::from_words(rows, size, &of(up, words)));
         }
         let (Some(relay), Some(links)) = (&network.relay, &self.conditions.links) else { return seen };
         let mut heard = Topology::empty(rows, rows);
         links.heard(z, dim, &mut heard);
-        heard.keep(&of(&relay.up, rows, rows));
+        if !relay.up.is_empty() {
+            heard.keep(&listened(rows, &of(&relay.up, Relay::words(rows)), Relay::shift(&self.shape)));
+        }
         links.told(&seen, &heard)
+    }
+}
+
+impl Failing {
+    /// All chains of the trials from trial `first` on; gives the network its masks.
+    #[allow(clippy::too_many_arguments, reason = "what fails, whose numbers, and where it is written")]
+    fn new(
+        failures: &Failures,
+        seed: u64,
+        first: u64,
+        trials: usize,
+        steps: usize,
+        shape: &Shape,
+        width: Width,
+        network: &mut Network,
+    ) -> Self {
+        let targets: Vec<Target> = failures.kinds().map(|kind| Target::new(kind, shape)).collect();
+        let blocks = trials.div_ceil(BLOCK);
+        let there = |part: Part| targets.iter().any(|target| target.part == part);
+        let words = |part: Part, count: usize| vec![[u64::MAX; BLOCK]; if there(part) { blocks * count } else { 0 }];
+        network.sensors = words(Part::Sensors, shape.words);
+        network.edges = words(Part::Edges, shape.words);
+        if let Some(relay) = &mut network.relay {
+            relay.up = words(Part::Links, Relay::words(shape.rows));
+        }
+        let mut agenda = Agenda::new(steps);
+        let mut flips = Flips::new(failures, seed, first, width);
+        flips.begin(trials, &mut agenda, |trial, chain| targets[chain].flip(trial, network, shape));
+        Self { targets, flips, agenda, places: (0..trials as u32).collect() }
+    }
+
+    /// Flips what is due at step k; whether anything may have changed in the last block.
+    fn advance(&mut self, k: usize, live: usize, network: &mut Network, shape: &Shape) -> bool {
+        let (places, targets) = (&self.places, &self.targets);
+        let mut last = false;
+        self.flips.flip(k, &mut self.agenda, |trial, chain| {
+            let place = places[trial];
+            if place == GONE {
+                return false;
+            }
+            targets[chain].flip(place as usize, network, shape);
+            last |= place as usize / BLOCK == live / BLOCK;
+            true
+        });
+        last
     }
 }

@@ -14,9 +14,11 @@
 //! | mask, relay, ς | [`Chances`] | what fails, who is told, who is shaken: the draws of a recorded run |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
 
+mod agenda;
 mod between;
 mod chunk;
 mod fates;
+mod flips;
 pub mod games;
 mod noise;
 mod trials;
@@ -259,16 +261,20 @@ mod tests {
         }
     }
 
-    /// The same in a world in which everything happens: failures, links, disturbances.
+    /// The same in worlds in which everything happens, or only some of it: failures, links with and without reaches,
+    /// disturbances; and every trial ends as its recorded run.
     #[test]
     fn widths_agree_to_the_bit_in_a_world() {
         use crate::network::Frame;
         use crate::random::Begin;
-        use crate::simulation::{Communication, World};
+        use crate::simulation::{Communication, Rules, World, simulate_with};
         let cancel = CancelToken::new();
         for (interaction, n, dim) in [
             (Interaction::I1, 2, 2),
+            (Interaction::I1, 3, 2),
             (Interaction::I1, 3, 3),
+            (Interaction::I2, 1, 3),
+            (Interaction::I2, 2, 2),
             (Interaction::I2, 3, 2),
             (Interaction::I1, 9, 2),
             (Interaction::I1, 2, 4),
@@ -276,36 +282,58 @@ mod tests {
             let trials = if n > 8 { 9 } else { 150 };
             let game = bank::unit_game(interaction, vec![1.0; n], 1.2, 0.8, 1.0, 0.2, 0.005).expect("a valid game");
             let m = game.constrained();
-            let world = World {
+            let never = vec![f64::INFINITY; m];
+            let talk = Communication {
+                radius: (0..m).map(|i| (i > 0).then_some(1.5 + i as f64)).collect(),
+                relays: Some(1),
+                frame: Frame::Common,
+                mean_time_up: vec![0.2; m],
+                mean_time_down: vec![0.1; m],
+                begin: Begin::Up,
+            };
+            let all = World {
                 mean_time_to_failure: vec![0.3; m],
                 mean_time_to_repair: vec![0.1; m],
                 mean_time_detected: vec![0.2; m],
                 mean_time_missed: vec![0.02; m],
                 begin: vec![Begin::Stationary; m],
-                communication: Some(Communication {
-                    radius: (0..m).map(|i| (i > 0).then_some(1.5 + i as f64)).collect(),
-                    relays: Some(1),
-                    frame: Frame::Common,
-                    mean_time_up: vec![0.2; m],
-                    mean_time_down: vec![0.1; m],
-                    begin: Begin::Up,
-                }),
+                communication: Some(talk.clone()),
                 disturbance: (0..n + 2).map(|p| if p == 1 { 0.0 } else { 0.3 }).collect(),
             };
-            let chances = Chances { world: &world, seed: 11, trial: (1 << 32) - 20 };
-            let conditions = chances.conditions(&game, trials as u64).expect("a valid world");
-            let (visibility, capture) = (vec![1.5; m], vec![0.1; n + 1]);
-            let positions: Vec<f64> = (0..trials * (n + 2) * dim).map(|i| 3.0 * (1.7 * i as f64).sin()).collect();
-            let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
-            let played = Width::all().into_iter().map(|width| {
+            let failing = World { communication: None, disturbance: vec![0.0; n + 2], ..all.clone() };
+            let shaken = World {
+                mean_time_to_failure: never.clone(),
+                mean_time_detected: never.clone(),
+                disturbance: vec![0.3; n + 2],
+                ..failing.clone()
+            };
+            let told = |talk| World { communication: Some(talk), disturbance: vec![0.0; n + 2], ..shaken.clone() };
+            let near = told(Communication { mean_time_up: never.clone(), ..talk.clone() });
+            let everywhere = told(Communication { radius: vec![Some(f64::INFINITY); m], ..talk });
+            for (which, world) in [all, failing, shaken, near, everywhere].iter().enumerate() {
+                let chances = Chances { world, seed: 11, trial: (1 << 32) - 20 };
+                let conditions = chances.conditions(&game, trials as u64).expect("a valid world");
+                let (visibility, capture) = (vec![1.5; m], vec![0.1; n + 1]);
+                let positions: Vec<f64> = (0..trials * (n + 2) * dim).map(|i| 3.0 * (1.7 * i as f64).sin()).collect();
+                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
+                let played = Width::all().into_iter().map(|width| {
+                    let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
+                    let mut ends = vec![End::NOT_PLAYED; trials];
+                    let played = Played { chances, conditions: &conditions };
+                    play(&policy, &batch, Some(&played), Between::NOTHING, 1, width, &mut ends, &cancel)
+                        .expect("a batch");
+                    (ends, policy.save_transitions(&cancel).expect("memory"))
+                });
+                let played: Vec<_> = played.collect();
+                assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n} {dim} {which}");
                 let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
-                let mut ends = vec![End::NOT_PLAYED; trials];
-                let played = Played { chances, conditions: &conditions };
-                play(&policy, &batch, Some(&played), Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
-                (ends, policy.save_transitions(&cancel).expect("memory"))
-            });
-            let played: Vec<_> = played.collect();
-            assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n} {dim}");
+                for i in (0..trials).step_by(29) {
+                    let of_trial = Chances { trial: chances.trial + i as u64, ..chances };
+                    let rules = Rules { chances: Some(of_trial), ..Rules::default() };
+                    let record = simulate_with(&policy, &batch.setup(i, n, m), rules, &cancel).expect("a run");
+                    assert_eq!(played[0].0[i], End::from(&record), "{interaction:?} {n} {dim} {which} {i}");
+                }
+            }
         }
     }
 }

@@ -4,11 +4,11 @@
 //! plain loops over the tile, and then every block by its own columns.
 
 use super::block::{BLOCK, Blocks, Shape};
-use crate::random::{Purpose, key, normals, of_trial, uniforms_of};
+use crate::random::{Counters, Purpose, key, normals};
 use crate::simd::{Number, Width, dispatch};
 
 /// Places of a tile: few enough for the first cache, enough for the tails to be worth gathering.
-const TILE: usize = 128;
+const TILE: usize = 256;
 
 /// What shakes the trials of a chunk.
 pub(super) struct Noise {
@@ -47,32 +47,28 @@ dispatch! {
     /// Shakes a tile.
     fn shaken<V>(noise: &mut Noise, k: u32, trials: &[u64; TILE], z: &mut [[f64; BLOCK]]) {
         let Shape { size, dim, .. } = noise.shape;
+        let counters = Counters::new(trials, noise.key);
         for (p, &s) in noise.spread.iter().enumerate() {
             if s == 0.0 {
                 continue;
             }
             for (pair, axes) in noise.added[p * dim..(p + 1) * dim].chunks_mut(2).enumerate() {
-                let purpose = Purpose::Disturbance(pair as u8);
-                let mut last = [[0; TILE]; 2];
-                for t in 0..TILE {
-                    let [low, high] = of_trial(trials[t], purpose);
-                    (last[0][t], last[1][t]) = (u64::from(low), u64::from(high));
-                }
+                let bits = Purpose::Disturbance(pair as u8).bits();
                 let (mut a, mut b) = ([0.0; TILE], [0.0; TILE]);
-                uniforms_of([k, p as u32], &last, noise.key, &mut a, &mut b);
-                for (axis, numbers) in axes.iter_mut().zip([&mut a, &mut b]) {
-                    normals::<V, _>(numbers);
-                    for t in 0..TILE {
-                        axis[t] = s * numbers[t];
-                    }
+                counters.uniforms([k, p as u32], bits, &mut a, &mut b);
+                for (axis, numbers) in axes.iter_mut().zip([&a, &b]) {
+                    normals::<V, _>(numbers, s, axis);
                 }
             }
         }
         let (players, own) = noise.added.split_at(size * dim);
         for (block, rows) in z.chunks_exact_mut(size * dim).enumerate() {
-            for (e, row) in rows.iter_mut().enumerate() {
-                let (by, own) = (&players[e][block * BLOCK..], &own[e % dim][block * BLOCK..]);
-                (V::Eight::load(row) + (V::Eight::load(by) - V::Eight::load(own))).store(row);
+            let at = block * BLOCK;
+            for (row, players) in rows.chunks_exact_mut(dim).zip(players.chunks_exact(dim)) {
+                for ((numbers, by), own) in row.iter_mut().zip(players).zip(own) {
+                    let by = V::Eight::load(&by[at..]) - V::Eight::load(&own[at..]);
+                    (V::Eight::load(numbers) + by).store(numbers);
+                }
             }
         }
     }

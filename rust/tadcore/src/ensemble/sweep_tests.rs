@@ -25,7 +25,7 @@ fn rims_belong_to_the_balls_at_every_size() {
         let mut keys = vec![[0; BLOCK]];
         let any = [f64::INFINITY; BLOCK];
         let caught = observe_any(&shape, &z, &sight, &capture, &any, &mut keys);
-        let (compiled, ends) = observe::<Baseline, 3, 2, 2>(&z, &sight, &capture, &any);
+        let (compiled, ends) = observe::<Baseline, 3, 2, 2, false>(&z, &sight, &capture, &any, &[]);
         assert_eq!((keys[0], caught), (Baseline::keys(compiled), u32::from(ends)));
         // With nothing on the table a sweep stops with what it saw, or with who is caught or beyond the limit: in the
         // second trial on the limit, in the last three a double beyond it, no number, and infinitely far.
@@ -49,7 +49,8 @@ fn rims_belong_to_the_balls_at_every_size() {
                 let mut blocks =
                     Blocks { z, sight, capture, far, sight_step: 0, capture_step: 0, network, live: BLOCK };
                 let mut seen = vec![[0; BLOCK]];
-                let stop = sweep_of(&shape)(width, &shape, &mut blocks, 0, &StepTable::new(2, 3), None, &mut seen);
+                let stop =
+                    sweep_of(&shape, None)(width, &shape, &mut blocks, 0, &StepTable::new(2, 3), None, &mut seen);
                 assert_eq!(stop, expected, "{width:?}");
                 assert!(over != 0 || seen == keys, "{width:?}");
             }
@@ -91,7 +92,7 @@ fn blocks_stop_where_single_strips_do() {
         let (mut keys, mut expected) = (vec![[0; BLOCK]], vec![[0; BLOCK]]);
         let (mut from, mut counts) = (0, [0; 2]);
         loop {
-            let stop = sweep_of(&shape)(width, &shape, &mut ours, from, &table, Some(&table), &mut keys);
+            let stop = sweep_of(&shape, None)(width, &shape, &mut ours, from, &table, Some(&table), &mut keys);
             assert_eq!(stop, sweep_any(width, &shape, &mut single, from, &table, None, &mut expected), "{width:?}");
             assert_eq!(ours.z, single.z, "{width:?} {stop:?}");
             match stop {

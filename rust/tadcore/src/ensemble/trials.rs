@@ -60,7 +60,9 @@ impl<'a> Trials<'a> {
         let (capture, capture_step) = reaches(batch.capture, size, first, trials);
         let who: Vec<u32> = (0..trials as u32).collect();
         let mut blocks = Blocks { z, sight, capture, far, sight_step, capture_step, network: None, live: trials };
-        let fates = played.map(|played| Fates::new(played, first, &who, shape, width, &mut blocks)).transpose()?;
+        let steps = policy.game().grid().steps();
+        let fates =
+            played.map(|played| Fates::new(played, first, trials, steps, shape, width, &mut blocks)).transpose()?;
         let mut of_chunk = Self { policy, batch, first, shape, blocks, who, fates };
         for place in 0..of_chunk.blocks.far.len() * BLOCK {
             let scale = divergence::scale(&of_chunk.state(place), dim);
@@ -73,7 +75,7 @@ impl<'a> Trials<'a> {
     /// Moves what fails on to t_k.
     pub(super) fn fail(&mut self, k: usize) {
         if let Some(fates) = &mut self.fates
-            && fates.fail(k, &self.who, &mut self.blocks)
+            && fates.fail(k, &mut self.blocks)
         {
             self.fill_up();
         }
@@ -144,10 +146,10 @@ impl<'a> Trials<'a> {
     pub(super) fn remove(&mut self, place: usize) {
         self.blocks.live -= 1;
         let last = self.blocks.live;
-        self.who[place] = self.who[last];
         if let Some(fates) = &mut self.fates {
-            fates.copy(last, place);
+            fates.moved(self.who[place], self.who[last], place);
         }
+        self.who[place] = self.who[last];
         self.blocks.copy(&self.shape, last, place);
     }
 

@@ -77,15 +77,33 @@ impl Failures {
         self.chains.iter().any(|(kind, _)| matches!(kind, Kind::Link(..)))
     }
 
-    /// The numbers of a chain in one trial, by index.
-    fn uniform(&self, kind: Kind, draws: &Draws) -> impl Fn(u32) -> f64 + use<> {
+    /// The purpose and the entity of a chain's numbers.
+    fn place(&self, kind: Kind) -> (Purpose, u32) {
         let (purpose, entity) = match kind {
             Kind::Sensor(i) => (Purpose::Sensor, i),
             Kind::Edge(i, j) => (Purpose::Edge, i * self.size + j),
             Kind::Link(i, j) => (Purpose::Link, i * self.rows + j),
         };
-        let draws = *draws;
-        move |index| draws.uniforms(purpose, entity as u32, index)[0]
+        (purpose, entity as u32)
+    }
+
+    /// The numbers of a chain in one trial, by index.
+    fn uniform(&self, kind: Kind, draws: &Draws) -> impl Fn(u32) -> f64 + use<> {
+        let ((purpose, entity), draws) = (self.place(kind), *draws);
+        move |index| draws.uniforms(purpose, entity, index)[0]
+    }
+
+    /// What each chain belongs to.
+    pub(crate) fn kinds(&self) -> impl Iterator<Item = Kind> + '_ {
+        self.chains.iter().map(|&(kind, _)| kind)
+    }
+
+    /// The law of each chain, with the entity of its numbers and the bits of their purpose.
+    pub(crate) fn laws(&self) -> impl Iterator<Item = (Chain, (u32, u32))> + '_ {
+        self.chains.iter().map(|&(kind, chain)| {
+            let (purpose, entity) = self.place(kind);
+            (chain, (entity, purpose.bits()))
+        })
     }
 
     /// Writes the chains of a trial at step 0; the step at which one changes next.

@@ -69,18 +69,19 @@ fn by_search(seen: &Topology, heard: &Topology, relays: Option<usize>, frame: Fr
 #[test]
 fn everyone_is_told_what_a_search_finds() {
     let mut bits = Bits(1);
-    for (rows, size) in
-        [(1, 2), (2, 2), (2, 3), (3, 3), (3, 4), (4, 4), (5, 6), (8, 9), (12, 13), (12, 12), (64, 65), (70, 70)]
-    {
-        let limit = if size > 20 { 6 } else { 300 };
+    let small = (1..=12).flat_map(|n| [(n, n + 1), (n + 1, n + 1)]);
+    for (rows, size) in small.chain([(64, 65), (70, 70)]) {
+        // Every bound on relays that can matter, and one that cannot, in both frames.
+        let bounds: Vec<_> = (0..=rows.min(12)).chain([99]).map(Some).chain([None]).collect();
+        let limit = if size > 20 { 6 } else { 12 * bounds.len() };
         for case in 0..limit {
             // Sparse ones, in which relays and single edges decide.
             let (of_sight, of_links) = (bits.below(200 / size as u64), bits.below(300 / size as u64));
             let seen = bits.network(rows, size, of_sight);
             let mut heard = bits.network(rows, rows, of_links);
             (0..rows).for_each(|i| heard.unset(i, i));
-            let relays = [None, Some(0), Some(1), Some(2), Some(99)][case % 5];
-            let frame = [Frame::Relative, Frame::Common][case / 5 % 2];
+            let relays = bounds[case % bounds.len()];
+            let frame = [Frame::Relative, Frame::Common][case / bounds.len() % 2];
             let links = Links::new(&vec![Some(1.0); rows], relays, frame);
             let told = links.told(&seen, &heard);
             assert_eq!(told, by_search(&seen, &heard, relays, frame), "{rows} {size} {relays:?} {frame:?}");

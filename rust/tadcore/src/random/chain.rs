@@ -51,6 +51,16 @@ impl Chain {
         self.share == 1.0 && self.stays[1] == 0.0
     }
 
+    /// ln(1 − p) of leaving a state; 0 where it is never left.
+    pub(crate) fn stays(&self, up: bool) -> f64 {
+        self.stays[usize::from(up)]
+    }
+
+    /// Whether it begins up, by a uniform number that is drawn where it matters.
+    pub(crate) fn begins_up(&self, uniform: impl FnOnce() -> f64) -> bool {
+        self.share == 1.0 || uniform() < self.share
+    }
+
     /// Steps from one flip to the next by a uniform number.
     fn holds(&self, up: bool, u: f64) -> Option<i32> {
         let stays = self.stays[usize::from(up)];
@@ -74,7 +84,7 @@ pub struct Walk {
 impl Walk {
     /// A chain at step 0; `uniform` gives the number of an index: 0 for the beginning, f for the f-th flip.
     pub fn new(chain: &Chain, uniform: impl Fn(u32) -> f64) -> Self {
-        let up = chain.share == 1.0 || uniform(0) < chain.share;
+        let up = chain.begins_up(|| uniform(0));
         let mut walk = Self { next: 0, state: u32::from(up) };
         walk.draw(chain, uniform);
         walk

@@ -21,8 +21,8 @@ mod philox;
 
 pub use chain::{Begin, Chain, NEVER, Walk};
 pub use normal::normal;
-pub(crate) use normal::normals;
-pub(crate) use philox::uniforms_of;
+pub(crate) use normal::{ln, normals};
+pub(crate) use philox::{Counters, first_uniforms};
 pub use philox::{philox, uniform};
 
 /// Trials that a seed has numbers for.
@@ -50,6 +50,11 @@ impl Purpose {
             Self::Disturbance(pair) => 4 + u32::from(pair),
         }
     }
+
+    /// Its bits in the fourth word.
+    pub(crate) fn bits(self) -> u32 {
+        self.code() << 24
+    }
 }
 
 /// The numbers of one trial.
@@ -66,18 +71,21 @@ pub(crate) fn key(seed: u64) -> [u32; 2] {
     [seed as u32, (seed >> 32) as u32]
 }
 
-/// The third and the fourth word of a trial's counters.
-#[inline(always)]
-pub(crate) fn of_trial(trial: u64, purpose: Purpose) -> [u32; 2] {
-    [trial as u32, purpose.code() << 24 | (trial >> 32) as u32]
-}
-
 impl Draws {
     /// A and B at one place.
     #[must_use]
     pub fn uniforms(&self, purpose: Purpose, entity: u32, index: u32) -> [f64; 2] {
-        let [low, high] = of_trial(self.trial, purpose);
-        let words = philox([index, entity, low, high], key(self.seed));
+        self.at(purpose.bits(), entity, index)
+    }
+
+    /// A at one place, by the bits of its purpose.
+    pub(crate) fn first(&self, bits: u32, entity: u32, index: u32) -> f64 {
+        self.at(bits, entity, index)[0]
+    }
+
+    fn at(&self, bits: u32, entity: u32, index: u32) -> [f64; 2] {
+        let last = [self.trial as u32, bits | (self.trial >> 32) as u32];
+        let words = philox([index, entity, last[0], last[1]], key(self.seed));
         [(words[1], words[0]), (words[3], words[2])].map(|(high, low)| uniform(u64::from(high) << 32 | u64::from(low)))
     }
 }

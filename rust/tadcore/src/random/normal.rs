@@ -121,7 +121,7 @@ pub fn normal(u: f64) -> f64 {
 
 /// ln p of a normal p below 1, by the operations of the `libm` crate (FreeBSD's `e_log.c`).
 #[inline(always)]
-fn ln(p: f64) -> f64 {
+pub fn ln(p: f64) -> f64 {
     const LN2: [f64; 2] = [6.931_471_803_691_238_164_90e-1, 1.908_214_929_270_587_700_02e-10];
     const G: [f64; 7] = [
         6.666_666_666_666_735_130e-1,
@@ -146,49 +146,62 @@ fn ln(p: f64) -> f64 {
     s * (half + (odd + even)) + k * LN2[1] - half + f + k * LN2[0]
 }
 
-/// [`normal`] of every number, eight at a time.
+/// |u − ½| up to which √(−ln p) is at most 5, and a little less: beyond, numbers are taken one by one.
+const NOT_FAR: f64 = 0.5 - 2e-11;
+
+/// A fraction at r.
 #[inline(always)]
-pub fn normals<V: Simd, const T: usize>(numbers: &mut [f64; T]) {
-    // Which lie in the tails, their p, and then √(−ln p) and the size.
-    let (mut which, mut count) = ([0; T], 0);
-    let mut tails = [0.25; T];
-    for (group, eight) in numbers.chunks_exact(8).enumerate() {
-        let q = V::Eight::load(eight) - V::Eight::splat(0.5);
-        let mut outside = V::Eight::bits(V::Eight::splat(MIDDLE).less(q.abs()));
-        while outside != 0 {
-            let t = outside.trailing_zeros() as usize;
-            let u = eight[t];
-            which[count] = (8 * group + t) as u32;
-            tails[count] = if u < 0.5 { u } else { 1.0 - u };
-            count += 1;
-            outside &= outside - 1;
-        }
+fn fraction<N: Number>([above, below]: &Fraction, r: N) -> [N; 2] {
+    let (mut over, mut under) = (N::splat(above[0]), N::splat(below[0]));
+    for c in 1..8 {
+        over = over * r + N::splat(above[c]);
+        under = under * r + N::splat(below[c]);
     }
-    for x in &mut *numbers {
-        *x = central(*x - 0.5);
+    [over, under]
+}
+
+/// `scale` times the [`normal`] of every number, eight at a time; the numbers are as many as eights, and multiples of 2⁻⁵³
+/// as all that are drawn.
+#[inline(always)]
+pub fn normals<V: Simd, const T: usize>(numbers: &[f64; T], scale: f64, to: &mut [f64; T]) {
+    // The middle part of all; the p of those in the tails, moved together, and which they are, a bit each.
+    let (mut tails, mut count, mut which) = ([0.25; T], 0, [0_u8; T]);
+    let half = V::Eight::splat(0.5);
+    let mut most = V::Eight::splat(0.0);
+    for group in 0..T / 8 {
+        let q = V::Eight::load(&numbers[8 * group..]) - half;
+        let [over, under] = fraction(&CENTRAL, V::Eight::splat(0.180625) - q * q);
+        (over * q / under).store(&mut to[8 * group..]);
+        let bits = V::Eight::bits(V::Eight::splat(MIDDLE).less(q.abs()));
+        // Of a multiple of 2⁻⁵³ exactly u, or 1 − u.
+        V::compress(half - q.abs(), bits, &mut tails[count..]);
+        most = most.or_larger(q.abs());
+        which[group] = bits as u8;
+        count += bits.count_ones() as usize;
     }
     let padded = count.next_multiple_of(8).min(T);
-    let mut largest = 0.0;
-    for p in &mut tails[..padded] {
-        *p = (-ln(*p)).sqrt();
-    }
-    for &root in &tails[..count] {
-        largest = if root > largest { root } else { largest };
-    }
-    if largest <= 5.0 {
-        for root in &mut tails[..padded] {
-            let r = *root - 1.6;
-            *root = at(&NEAR[0], r) / at(&NEAR[1], r);
+    tails[count..padded].fill(0.25);
+    if V::Eight::bits(V::Eight::splat(NOT_FAR).less(most)) == 0 {
+        for p in &mut tails[..padded] {
+            let r = (-ln(*p)).sqrt() - 1.6;
+            let [over, under] = fraction(&NEAR, r);
+            *p = over / under;
         }
     } else {
-        for root in &mut tails[..count] {
-            *root = tail(*root);
+        for p in &mut tails[..count] {
+            *p = tail((-ln(*p)).sqrt());
         }
     }
-    for (&t, &size) in which[..count].iter().zip(&tails) {
+    let mut from = 0;
+    for group in 0..T / 8 {
         // The fraction of the middle part has no pole out there, and the sign of u − ½.
-        let x = &mut numbers[t as usize];
-        *x = size.copysign(*x);
+        let x = V::Eight::load(&to[8 * group..]);
+        let start = from.min(T - 8);
+        let size = V::expand(&tails[start..], which[group].into());
+        let size = V::Eight::select(x.less(V::Eight::splat(0.0)), V::Eight::splat(0.0) - size, size);
+        let x = V::Eight::select(V::Eight::mask(which[group].into()), size, x);
+        (V::Eight::splat(scale) * x).store(&mut to[8 * group..]);
+        from += which[group].count_ones() as usize;
     }
 }
 
@@ -230,20 +243,21 @@ mod tests {
     fn many_at_once_are_bitwise_one_after_another() {
         for first in (0..1_000_000).step_by(128) {
             let numbers: [f64; 128] = std::array::from_fn(|t| uniform(bits(first + t as u64)));
-            let mut all = numbers;
-            normals::<Baseline, _>(&mut all);
+            let mut all = [0.0; 128];
+            normals::<Baseline, _>(&numbers, 1.0, &mut all);
             for (x, u) in all.into_iter().zip(numbers) {
                 assert!(x.to_bits() == normal(u).to_bits(), "{u}: {x}");
             }
         }
         // All of one kind, the last one alone, and the ends.
-        for fill in [0.5, 0.01, 0.99, 1e-15, uniform(0), uniform(u64::MAX)] {
-            for last in [0.5, 0.001, 1e-14] {
-                let mut all = [fill; 16];
-                all[15] = last;
-                normals::<Baseline, _>(&mut all);
-                assert_eq!(all[..15], [normal(fill); 15]);
-                assert_eq!(all[15], normal(last));
+        let drawn = |u: f64| (u * 2f64.powi(53)).round() * 2f64.powi(-53);
+        for fill in [0.5, drawn(0.01), drawn(0.99), drawn(1e-15), uniform(0), uniform(u64::MAX)] {
+            for last in [0.5, drawn(0.001), drawn(1e-14)] {
+                let (mut numbers, mut all) = ([fill; 16], [0.0; 16]);
+                numbers[15] = last;
+                normals::<Baseline, _>(&numbers, 3.0, &mut all);
+                assert_eq!(all[..15], [3.0 * normal(fill); 15]);
+                assert_eq!(all[15], 3.0 * normal(last));
             }
         }
     }

@@ -16,9 +16,9 @@ fn schedule(key: [u32; 2]) -> [[u64; 2]; ROUNDS as usize] {
     std::array::from_fn(|round| [of(round, 0), of(round, 1)])
 }
 
-/// All rounds on words of 32 bits in the low halves of words of 64: the high halves are not read, and not cleared.
+/// Rounds on words of 32 bits in the low halves of words of 64: the high halves are not read, and not cleared.
 #[inline(always)]
-fn rounds(mut x: [u64; 4], keys: &[[u64; 2]; ROUNDS as usize]) -> [u64; 4] {
+fn rounds(mut x: [u64; 4], keys: &[[u64; 2]]) -> [u64; 4] {
     let low = |word: u64| word & 0xFFFF_FFFF;
     for key in keys {
         let (p0, p1) = (MULTIPLIERS[0] * low(x[0]), MULTIPLIERS[1] * low(x[2]));
@@ -42,20 +42,72 @@ pub fn uniform(bits: u64) -> f64 {
     f64::from_bits(1023 << 52 | bits >> 12) - (1.0 - f64::EPSILON / 2.0)
 }
 
-/// A and B of many counters that differ in their last two words.
+/// A of four words, and B.
 #[inline(always)]
-pub fn uniforms_of<const T: usize>(
-    start: [u32; 2],
-    last: &[[u64; T]; 2],
-    key: [u32; 2],
-    a: &mut [f64; T],
-    b: &mut [f64; T],
-) {
-    let (keys, start) = (schedule(key), start.map(u64::from));
+fn pair(words: [u64; 4]) -> [f64; 2] {
+    [(words[1], words[0]), (words[3], words[2])].map(|(high, low)| uniform(high << 32 | low & 0xFFFF_FFFF))
+}
+
+/// A of many counters.
+#[inline(always)]
+pub fn first_uniforms<const T: usize>(counters: &[[u64; T]; 4], key: [u32; 2], a: &mut [f64; T]) {
+    let keys = schedule(key);
     for t in 0..T {
-        let words = rounds([start[0], start[1], last[0][t], last[1][t]], &keys);
+        let words = rounds([counters[0][t], counters[1][t], counters[2][t], counters[3][t]], &keys);
         a[t] = uniform(words[1] << 32 | words[0] & 0xFFFF_FFFF);
-        b[t] = uniform(words[3] << 32 | words[2] & 0xFFFF_FFFF);
+    }
+}
+
+/// Counters whose third words differ, and sometimes their fourth ones: those of many trials.
+pub struct Counters<const T: usize> {
+    keys: [[u64; 2]; ROUNDS as usize],
+    /// The third words, and what the first round makes of them.
+    third: [u64; T],
+    product: [u64; T],
+    /// The fourth words.
+    fourth: [u64; T],
+    /// Whether those are all one.
+    alike: bool,
+}
+
+impl<const T: usize> Counters<T> {
+    /// Of trials.
+    #[inline(always)]
+    pub fn new(trials: &[u64; T], key: [u32; 2]) -> Self {
+        let (mut third, mut product, mut fourth) = ([0; T], [0; T], [0; T]);
+        let mut differ = 0;
+        for t in 0..T {
+            third[t] = trials[t] & 0xFFFF_FFFF;
+            product[t] = MULTIPLIERS[1] * third[t];
+            fourth[t] = trials[t] >> 32;
+            differ |= fourth[t] ^ fourth[0];
+        }
+        Self { keys: schedule(key), third, product, fourth, alike: differ == 0 }
+    }
+
+    /// A and B of all of them, with these first two words, and these bits in the fourth.
+    #[inline(always)]
+    pub fn uniforms(&self, [first, second]: [u32; 2], bits: u32, a: &mut [f64; T], b: &mut [f64; T]) {
+        let (first, second, bits) = (u64::from(first), u64::from(second), u64::from(bits));
+        let keys = &self.keys;
+        if !self.alike {
+            for t in 0..T {
+                [a[t], b[t]] = pair(rounds([first, second, self.third[t], self.fourth[t] | bits], keys));
+            }
+            return;
+        }
+        // Three rounds, of which what is the same for all is done once.
+        let low = |word: u64| word & 0xFFFF_FFFF;
+        let p = MULTIPLIERS[0] * first;
+        let q = MULTIPLIERS[1] * low(p >> 32 ^ self.fourth[0] ^ bits ^ keys[0][1]);
+        let own = [second ^ keys[0][0], q >> 32 ^ keys[1][0], low(p) ^ keys[1][1], q ^ keys[2][0]];
+        for t in 0..T {
+            let product = self.product[t];
+            let one = MULTIPLIERS[0] * low(product >> 32 ^ own[0]);
+            let (two, three) = (MULTIPLIERS[0] * low(product ^ own[1]), MULTIPLIERS[1] * low(one >> 32 ^ own[2]));
+            let x = [three >> 32 ^ own[3], three, two >> 32 ^ one ^ keys[2][1], two];
+            [a[t], b[t]] = pair(rounds(x, &keys[3..]));
+        }
     }
 }
 
@@ -89,12 +141,23 @@ mod tests {
 
     #[test]
     fn many_counters_are_one_after_another() {
-        let last: [[u64; 16]; 2] = std::array::from_fn(|w| std::array::from_fn(|t| (t * t + 3 * w) as u64));
-        let (mut a, mut b) = ([0.0; 16], [0.0; 16]);
-        uniforms_of([9, 4], &last, [5, 6], &mut a, &mut b);
-        for t in 0..16 {
-            let w = philox([9, 4, last[0][t] as u32, last[1][t] as u32], [5, 6]).map(u64::from);
-            assert_eq!([a[t], b[t]], [uniform(w[1] << 32 | w[0]), uniform(w[3] << 32 | w[2])]);
+        for (trials, start) in [(1, [9, 4]), (1 << 40, [u32::MAX, 77]), ((1 << 32) - 7, [0, u32::MAX])] {
+            let trials: [u64; 16] = std::array::from_fn(|t| trials + (t * t) as u64);
+            let (mut a, mut b, mut first) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+            Counters::new(&trials, [5, 6]).uniforms(start, 3 << 24, &mut a, &mut b);
+            let counters = [
+                [start[0].into(); 16],
+                [start[1].into(); 16],
+                trials.map(|trial| trial & 0xFFFF_FFFF),
+                trials.map(|trial| trial >> 32 | 3 << 24),
+            ];
+            first_uniforms(&counters, [5, 6], &mut first);
+            for t in 0..16 {
+                let last = [trials[t] as u32, (trials[t] >> 32) as u32 | 3 << 24];
+                let w = philox([start[0], start[1], last[0], last[1]], [5, 6]).map(u64::from);
+                assert_eq!([a[t], b[t]], [uniform(w[1] << 32 | w[0]), uniform(w[3] << 32 | w[2])]);
+                assert_eq!(first[t], a[t]);
+            }
         }
     }
 }

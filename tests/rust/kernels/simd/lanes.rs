@@ -1,7 +1,7 @@
 //! Each operation, lane by lane, against the same one on numbers by themselves.
 
 use tadcore_kernels::dispatch;
-use tadcore_kernels::simd::{Number, Scalar, Simd, Width, dot, dot_in_order, norm, take};
+use tadcore_kernels::simd::{Entries, Number, Scalar, Simd, Width, dot, dot_in_order, norm, take};
 
 /// Pairs of them are in any order, equal, of both signs, zero, and no numbers; all are numbers of single precision.
 const NUMBERS: [f64; 11] =
@@ -119,6 +119,23 @@ fn check_whole<V: Simd>() {
     (0..8).for_each(|lane| assert_eq!(low[lane / 4] >> (16 * (lane % 4)) & 0xFFFF, expected[lane]));
     let keys = V::set(keys, 1 << 40, V::Eight::mask(0b1000_0001));
     assert_eq!(V::keys(keys), std::array::from_fn(|l| expected[l] | if l % 7 == 0 { 1 << 40 } else { 0 }));
+    let others: [u64; 8] = std::array::from_fn(|l| (1 << 40) | (l as u64 * 0x0123_4567));
+    let both = V::keys(V::both(keys, V::load_keys(&others)));
+    assert_eq!(both, std::array::from_fn(|l| V::keys(keys)[l] & others[l]));
+    // Words at both ends of a table, and keys with bits that it has not.
+    let mut table = Entries::new(6);
+    (0..64).for_each(|key| table.set(key, (key * 1021 + 3) as u16));
+    let asked = [0, 63, 1, 62, 64 + 5, u64::MAX, 17, 1 << 40];
+    assert_eq!(V::keys(V::entries(&table, V::load_keys(&asked))), asked.map(|key| (key % 64 * 1021 + 3) & 0xFFFF));
+    for bits in 0..=255_u16 {
+        let chosen: Vec<f64> = (0..8).filter(|l| bits >> l & 1 == 1).map(|l| numbers[l]).collect();
+        let mut front = [0.0; 8];
+        V::compress(V::Eight::load(&numbers), bits, &mut front);
+        assert_eq!(front[..chosen.len()], chosen);
+        let apart = V::expand(&numbers[8..], bits);
+        let lanes = (0..8).filter(|l| bits >> l & 1 == 1);
+        lanes.enumerate().for_each(|(at, lane)| assert_eq!(apart.lane(lane), numbers[8 + at]));
+    }
 }
 
 #[test]
