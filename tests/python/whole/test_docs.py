@@ -131,6 +131,13 @@ def test_every_decision_has_a_number_of_its_own():
         assert page.read_text(encoding="utf-8").startswith(f"# {number} · "), page.name
 
 
+def test_code_cells_keep_to_eighty_columns():
+    for page in PAGES:
+        for cell in re.findall(r"```\{code-cell\} python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
+            long = [line for line in cell.splitlines() if len(line) > 80]
+            assert not long, (page.name, long)
+
+
 def test_relative_links_and_pictures_exist():
     for page in [*PAGES, DOCS.parent / "CONTRIBUTING.md"]:
         text = page.read_text(encoding="utf-8")
