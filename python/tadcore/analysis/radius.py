@@ -27,7 +27,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_amount
 from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
@@ -154,9 +154,9 @@ def radius_curve(
     grid = asked[0][0]
     if grid.ndim != 1 or grid.size == 0 or np.any(grid[1:] <= grid[:-1]):
         raise ScenarioError("radii", radii, "a list of increasing radii")
-    places = len(games) * len(grid)
+    places, finest = len(games) * len(grid), as_amount("tolerance", tolerance) if refine else None
     curves = tuple(
-        _curve(each, grid, own, sure, places, tolerance if refine else None, progress=progress)
+        _curve(each, grid, own, sure, places, finest, progress=progress)
         for each, (_, own) in zip(games, asked, strict=True)
     )
     return curves[0] if isinstance(player, str) else RadiusCurves(curves)

@@ -53,6 +53,8 @@ pub(crate) struct Motion<'a> {
     /// Parts that may still be looked at, and whether there were too few: what was found is then not to be relied on.
     left: usize,
     lost: bool,
+    /// The rows that bound how a row turns: all, or where these were too many parts, only those that move it.
+    movers: Option<Vec<bool>>,
     cancel: &'a CancelToken,
 }
 
@@ -92,23 +94,55 @@ impl<'a> Motion<'a> {
         let norm = closed_loop::norm(c, size);
         let mut square = zeros(WHAT, size * size)?;
         multiply(&mut square, c, c, size, cancel)?;
-        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, lost: false, cancel })
+        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, lost: false, movers: None, cancel })
     }
 
     /// The first s in (0, δ] with ‖z_i(s)‖² ≤ `reach`, from a start outside; `start` and `end` are z(0) and z(δ).
     pub(crate) fn enters(&mut self, i: usize, reach: f64, start: &[f64], end: &[f64]) -> Result<Option<f64>, Stopped> {
-        self.left = PARTS;
-        self.first(i, reach, Part { level: 0, from: 0.0, start, end })
+        let whole = Part { level: 0, from: 0.0, start, end };
+        self.followed(i, |motion| motion.first(i, reach, whole))
     }
 
     /// The s in [0, δ] at which ‖z_i(s)‖ is least, and that distance.
     pub(crate) fn closest(&mut self, i: usize, start: &[f64], end: &[f64]) -> Result<(f64, f64), Stopped> {
         let row = |z: &[f64]| squared_norm(&z[i * self.dim..(i + 1) * self.dim]).sqrt();
         let (before, after) = (row(start), row(end));
-        let mut best = if after < before { (self.step, after) } else { (0.0, before) };
+        let nearest_end = if after < before { (self.step, after) } else { (0.0, before) };
+        let whole = Part { level: 0, from: 0.0, start, end };
+        self.followed(i, |motion| {
+            let mut best = nearest_end;
+            motion.nearer(i, whole, &mut best)?;
+            Ok(best)
+        })
+    }
+
+    /// What is found of row i in so many parts; where another row that does not move this one explodes, its motion bounds
+    /// nothing, and the parts are counted anew without it.
+    fn followed<T>(&mut self, i: usize, find: impl Fn(&mut Self) -> Result<T, Stopped>) -> Result<T, Stopped> {
+        let before = self.lost;
         self.left = PARTS;
-        self.nearer(i, Part { level: 0, from: 0.0, start, end }, &mut best)?;
-        Ok(best)
+        let mut found = find(self)?;
+        if self.lost && !before {
+            (self.lost, self.left, self.movers) = (false, PARTS, Some(self.movers_of(i)));
+            found = find(self)?;
+            self.movers = None;
+        }
+        Ok(found)
+    }
+
+    /// The rows that the motion of row i depends on, itself among them.
+    fn movers_of(&self, i: usize) -> Vec<bool> {
+        let (mut movers, mut next) = (vec![false; self.size], vec![i]);
+        movers[i] = true;
+        while let Some(row) = next.pop() {
+            for (j, &c) in self.c[row * self.size..(row + 1) * self.size].iter().enumerate() {
+                if c != 0.0 && !movers[j] {
+                    movers[j] = true;
+                    next.push(j);
+                }
+            }
+        }
+        movers
     }
 
     /// Whether the motion turned too often for some row to be followed.
@@ -172,7 +206,9 @@ impl<'a> Motion<'a> {
             |share: f64| -> f64 { length(&p.iter().zip(q).map(|(p, q)| p + share * (q - p)).collect::<Vec<f64>>()) };
         let turning = self.moved(&self.square, part.start);
         let farthest = part.start.chunks_exact(dim).map(length).fold(0.0, f64::max);
-        let most = turning.chunks_exact(dim).map(length).fold(0.0, f64::max);
+        let counts = |j: usize| self.movers.as_ref().is_none_or(|movers| movers[j]);
+        let rows = turning.chunks_exact(dim).enumerate().filter(|&(j, _)| counts(j));
+        let most = rows.map(|(_, z)| length(z)).fold(0.0, f64::max);
         let size = self.norm * width;
         let bend = if size <= SHORT {
             length(&turning[i * dim..(i + 1) * dim]) + size.exp_m1() * most
@@ -357,6 +393,17 @@ mod tests {
                 assert_eq!(motion.lost(), lost, "{turns} turns");
             });
         }
+    }
+
+    /// A row that comes to rest beside one that explodes: what does not move it does not count.
+    #[test]
+    fn a_row_that_explodes_hides_none_that_it_does_not_move() {
+        let (c, start, end) = ([-1.0, 0.0, 0.0, 260.0], [2.0, 1.0], [2.0 * (-1.0_f64).exp(), 260.0_f64.exp()]);
+        let cancel = CancelToken::new();
+        let mut motion = Motion::new(&c, 2, 1, 1.0, &cancel).expect("memory");
+        let found = motion.enters(0, 1.0, &start, &end).expect("memory").expect("a crossing");
+        assert!((found - std::f64::consts::LN_2).abs() < 1e-13 && !motion.lost(), "{found}");
+        assert!(motion.enters(1, 0.25, &start, &end).expect("memory").is_none() && !motion.lost());
     }
 
     /// A stiff row that runs past the origin to where a row at rest draws it: x = 1 − 2 e^{−λs}, y = 0.005.
