@@ -43,7 +43,12 @@ from .game.passes import Pass as Pass
 from .game.synthesis import Gains as Gains, synthesize as synthesize
 from .scenario.model import Scenario as Scenario
 from .scenario.players import Attacker as Attacker, Defender as Defender, Target as Target
-from .scenario.tables import Communication as Communication, Disturbance as Disturbance, Sensing as Sensing
+from .scenario.tables import (
+    Communication as Communication,
+    Disturbance as Disturbance,
+    Sensing as Sensing,
+    Transmitter as Transmitter,
+)
 from .simulation.batch import Batch as Batch, simulate_batch as simulate_batch
 from .simulation.loading import load_run as load_run
 from .simulation.play import simulate as simulate
