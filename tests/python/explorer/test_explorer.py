@@ -301,8 +301,10 @@ def ask(port, *lines):
         with contextlib.suppress(TimeoutError):
             while part := connection.recv(65536):
                 answer += part
-                if b" 101 " in answer:
-                    break
+                head, _, body = answer.partition(b"\r\n\r\n")
+                length = re.search(rb"(?i)^content-length: (\d+)", head, re.MULTILINE)
+                if b" 101 " in head or (length and len(body) >= int(length[1])):
+                    break  # after a refused upgrade the server may leave the connection open
     return answer.split(b"\r\n")[0].decode(), answer.decode("utf-8", "replace")
 
 
