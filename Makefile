@@ -72,7 +72,7 @@ test-rust:
 # Two halves side by side, of about the same length; with one thread of BLAS each, or they get in each other's way.
 test-games test-rest: export OPENBLAS_NUM_THREADS := 1
 test-games test-rest: export OMP_NUM_THREADS := 1
-GAMES := $(addprefix tests/python/,study simulation verification analysis report explorer)
+GAMES := $(addprefix tests/python/,study simulation verification analysis report)
 test-python: setup
 	@$(MAKE) --silent --jobs=2 test-games test-rest
 	$(BIN)/python -m mypy.stubtest tadcore._core
