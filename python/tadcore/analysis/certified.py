@@ -24,7 +24,7 @@ from tadcore.scenarios.given import ScenarioLike, as_scenario
 from .boxes import CertifiedMap
 from .loading import TITLE
 
-_TOGETHER = 1 << 13  # cells between two looks at the keyboard and the progress bar
+_TOGETHER = 1 << 13  # cells after which the keyboard is read and the progress bar moves
 _MOST_CELLS = 10**9
 _FINE = 1024  # cells along the longer side by default, at their least
 
@@ -110,7 +110,7 @@ def certified_map(
 
 
 def _advances(cells: _core.Cells, threads: int | None) -> Iterator[int]:
-    """Looks at one cell after another, some thousands at once."""
+    """Go through the cells, some thousands at once."""
     while not cells.done:
         yield from range(cells.advance(_TOGETHER, threads=threads))
 

@@ -69,7 +69,7 @@ impl Cells {
         })
     }
 
-    /// Looks at the next cells, at most so many; how many it were. Stopped, the map is as before.
+    /// Goes through the next cells, at most so many; how many it were. Stopped, the map is as before.
     #[pyo3(signature = (cells, *, threads=None, stop=None))]
     fn advance(&self, py: Python<'_>, cells: usize, threads: Option<usize>, stop: Option<&Stop>) -> PyResult<usize> {
         guarded(|| {

@@ -158,11 +158,11 @@ def test_the_built_pages_are_read_for_what_no_cell_should_print(tmp_path):
     png("wide.png", 1400)
     png("small.png", 500)
     cell = '<div class="cell_output docutils container">{}</div>'
-    good = cell.format("<pre>d1 at t = 1.395, see https://x.y/work/z</pre>") + "<pre>ls /home/you; Warning: mine</pre>"
+    good = cell.format("<pre>d1 at t = 1.395, see https://x.y/home/z</pre>") + "<pre>ls /home/you; Warning: mine</pre>"
     (tmp_path / "a.html").write_text(good + cell.format('<img src="wide.png" style="width: 660px;">'))
     assert check_pages(tmp_path).returncode == 0
     bad = [
-        "<pre>/work/main/x.py: gone</pre>",
+        "<pre>/home/ada/x.py: gone</pre>",
         '<div class="output stderr highlight"><pre>TqdmWarning</pre></div>',
         "<pre>UserWarning: beware</pre>",
         '<img src="small.png">',
@@ -173,7 +173,7 @@ def test_the_built_pages_are_read_for_what_no_cell_should_print(tmp_path):
     assert done.returncode == 1
     assert done.stdout.splitlines() == [
         "a.html: on standard error: TqdmWarning",
-        "a.html: a path of this machine: /work/main",
+        "a.html: a path of this machine: /home/ada",
         "a.html: a warning: UserWarning: beware",
         "a.html: small.png has 500 pixels, shown as wide as they are",
         "a.html: wide.png has 1400 pixels, shown 300",

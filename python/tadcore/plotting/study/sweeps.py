@@ -170,11 +170,11 @@ def _marks(outcomes: Sequence[str]) -> list[Any]:
     """Legend entries of points."""
     from matplotlib.lines import Line2D
 
-    looks = [outcome_look(name) for name in outcomes]
+    styles = [outcome_look(name) for name in outcomes]
     return [
         Line2D([], [], color=it.colour, linestyle="none", marker=it.marker, markersize=3.4, markerfacecolor=paper(),
                label=it.label)
-        for it in looks
+        for it in styles
     ]  # fmt: skip
 
 

@@ -252,9 +252,9 @@ def prove_theta(objective: FullObjective, rows: Floats, near: Proof | None = Non
     found = relax(objective, x, _FLOOR * scale, near, deep=deep)
     theta, steps, lower = found.theta, found.steps, None
     if found.point is not None:
-        rival = minimize(objective.theta, found.point, jac=objective.gradient, method="BFGS", options={"gtol": 1e-12})
-        if rival.fun < float(theta) * (1.0 - _LOWER):
-            lower, found = objective.rows(rival.x), relax(objective, rival.x, _FLOOR * scale)
+        descent = minimize(objective.theta, found.point, jac=objective.gradient, method="BFGS", options={"gtol": 1e-12})
+        if descent.fun < float(theta) * (1.0 - _LOWER):
+            lower, found = objective.rows(descent.x), relax(objective, descent.x, _FLOOR * scale)
             steps += found.steps
     proof = found.proof
     value = math.nextafter(float(proof.bound), -math.inf) if proof else -math.inf
