@@ -15,7 +15,8 @@ from urllib.parse import unquote, urldefrag, urlsplit
 
 LEAST_WIDTH = 640  # pixels of a figure as it is shown, where the page is as wide
 SHARP = 2  # of its own for each of them
-MACHINE = re.compile(r"(?<![\w.:/-])/(?:home|root|tmp|usr|work|var|Users|private)/[\w.-]+")
+HERE = str(Path(__file__).resolve().parents[1])
+MACHINE = re.compile(r"(?<![\w.:/-])/(?:home|root|tmp|usr|var|Users|private)/[\w.-]+")
 
 
 class Page(HTMLParser):
@@ -90,7 +91,8 @@ def blemishes(root: Path) -> list[str]:
         page, name = Page(file.read_text(encoding="utf-8")), file.relative_to(root)
         lines += [f"{name}: on standard error: {text.strip()[:90]}" for text in page.errors]
         for text in page.printed:
-            lines += [f"{name}: a path of this machine: {found}" for found in MACHINE.findall(text)]
+            found = [HERE] if HERE in text else MACHINE.findall(text)
+            lines += [f"{name}: a path of this machine: {path}" for path in found]
             if "Warning:" in text:
                 lines.append(f"{name}: a warning: {text.strip()[:90]}")
         for source, style in page.figures.items():

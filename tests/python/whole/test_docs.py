@@ -163,6 +163,7 @@ def test_the_built_pages_are_read_for_what_no_cell_should_print(tmp_path):
     assert check_pages(tmp_path).returncode == 0
     bad = [
         "<pre>/home/ada/x.py: gone</pre>",
+        f"<pre>{DOCS.parent}/x.py: gone</pre>",
         '<div class="output stderr highlight"><pre>TqdmWarning</pre></div>',
         "<pre>UserWarning: beware</pre>",
         '<img src="small.png">',
@@ -174,6 +175,7 @@ def test_the_built_pages_are_read_for_what_no_cell_should_print(tmp_path):
     assert done.stdout.splitlines() == [
         "a.html: on standard error: TqdmWarning",
         "a.html: a path of this machine: /home/ada",
+        f"a.html: a path of this machine: {DOCS.parent}",
         "a.html: a warning: UserWarning: beware",
         "a.html: small.png has 500 pixels, shown as wide as they are",
         "a.html: wide.png has 1400 pixels, shown 300",
