@@ -193,7 +193,7 @@ study(22 * CHUNK + 5).run(store=sys.argv[1], keep=sys.argv[2], threads=int(sys.a
 @pytest.mark.parametrize("keep", KEEPS)
 def test_kill_9_at_any_moment_and_the_same_files(keep, tmp_path, monkeypatch):
     folder, rng, kills = tmp_path / "killed", np.random.default_rng(len(keep)), 0
-    for attempt in range(2):
+    for attempt in range(4):
         with subprocess.Popen([sys.executable, "-c", KILLED, folder, keep, str(1 + attempt % 2)], cwd=HERE) as process:
             before = files(folder) if folder.exists() else {}
             while process.poll() is None and (not folder.exists() or files_now(folder) == set(before)):
@@ -201,7 +201,7 @@ def test_kill_9_at_any_moment_and_the_same_files(keep, tmp_path, monkeypatch):
             time.sleep(rng.uniform(0.0, 0.3))
             process.send_signal(signal.SIGKILL)
         kills += process.returncode == -signal.SIGKILL
-    assert kills
+    assert kills >= 2
     monkeypatch.setattr("tadcore.study.parts.GROUP", 4)
     result = study(22 * CHUNK + 5).run(store=folder, keep=keep)
     again = study(22 * CHUNK + 5).run(store=tmp_path / "once", keep=keep)
