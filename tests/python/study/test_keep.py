@@ -185,7 +185,7 @@ from tadcore.study.plan import Plan
 parts.GROUP = 4
 writing._PATIENCE = keepers._PATIENCE = 0.1
 play = Plan.play
-Plan.play = lambda *given: (time.sleep(0.03), play(*given))[1]
+Plan.play = lambda *given: (time.sleep(0.1), play(*given))[1]
 study(22 * CHUNK + 5).run(store=sys.argv[1], keep=sys.argv[2], threads=int(sys.argv[3]))
 """
 
