@@ -6,7 +6,7 @@ number may read. Readers of Parquet take the folder for one table: they pass ove
 or a dot.
 
 What a part holds is in its name, so opening a store of thousands of parts reads none of them. While a run is under way
-smaller parts are written, about one a second; they are joined when all trials of a part are there. Where a run was
+smaller parts are written where one takes long; they are joined when all trials of a part are there. Where a run was
 killed between the two, the larger part counts.
 """
 

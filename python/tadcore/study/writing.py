@@ -1,4 +1,4 @@
-"""Chunks on their way to the disk: held until a part is whole or a second has passed, and written by other threads."""
+"""Chunks on their way to the disk: held until a part is whole or some seconds have passed, written by other threads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from .parts import Part, name_of
 from .plan import Outcomes
 from .store import Store, write
 
-_PATIENCE = 1.0  # seconds that a finished chunk waits for its part to be whole
+_PATIENCE = 5.0  # seconds that a finished chunk waits for its part to be whole
+_HELD = 4  # parts of which the chunks that are stored stay at hand until the rest comes, so that none is read again
 _THREADS = 2
 _PENDING = 4  # parts that wait for the disk, at most: then the study waits, too
 
@@ -39,6 +40,7 @@ class Writer:
         self._left = Counter(chunk // parts.GROUP for chunk in chunks)
         self._open: dict[int, dict[int, Outcomes]] = {}
         self._since: dict[int, float] = {}
+        self._held: dict[int, dict[int, Outcomes]] = {}
         self._before: dict[int, list[Future[None]]] = {}
         self._pending: deque[Future[None]] = deque()
         self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="tadcore-store")
@@ -71,6 +73,10 @@ class Writer:
     def _submit(self, group: int, *, join: bool) -> None:
         self._since.pop(group, None)
         chunks, before = self._open.pop(group, {}), self._before.pop(group, [])
+        if join:
+            chunks = self._held.pop(group, {}) | chunks
+        elif group in self._held or len(self._held) < _HELD:
+            self._held.setdefault(group, {}).update(chunks)
         future = self._pool.submit(self._put, group, chunks, before, join)
         self._pending.append(future)
         if not join:
