@@ -137,6 +137,19 @@ class Game:
         first_trial: int = 0,
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
         """Kind, defender, time, whether the game diverged, and whether it passed within a radius between instants."""
+    def score_batch(
+        self,
+        positions: NDArray[np.float64],
+        visibility_radii: NDArray[np.float64],
+        capture_radii: NDArray[np.float64],
+        *,
+        threads: int | None = None,
+        stop: Stop | None = None,
+        world: World | None = None,
+        seed: int = 0,
+        first_trial: int = 0,
+    ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+        """Kind, defender, time, whether the game diverged, and scores: timeout, captured, intercepted, d1 to dn."""
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
     def table_length(self, start: bytes) -> int:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
 from tadcore._shared.calls import public
 from tadcore._shared.html import as_html
+from tadcore.errors import ScenarioError
 from tadcore.game.compiled import core_world, game_of
 from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
 from tadcore.scenarios.given import ScenarioLike, as_scenario
@@ -47,6 +48,10 @@ class Batch:
         termination the game would end there. Not looked for after a divergence. None where that was not asked for.
     n : int
         Number of defenders.
+    scores : ndarray of float64, shape (M, n + 3), or None
+        How far each game was from every outcome, in the order timeout, captured, intercepted, d1 … dn: at least 0
+        exactly where the game ended so and did not diverge before. Lengths: the least change of the distances in
+        question that would have decided it otherwise. None where that was not asked for.
     """
 
     kind: NDArray[np.int8]
@@ -55,6 +60,7 @@ class Batch:
     diverged: NDArray[np.bool_]
     passed: NDArray[np.bool_] | None = None
     n: int = 0
+    scores: Floats | None = None
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row for each game: ``outcome``, a categorical as in a study's table, and the arrays."""
@@ -85,7 +91,9 @@ class Batch:
     def __getitem__(self, index: int | slice) -> Outcome | Batch:
         if isinstance(index, slice):
             passed = None if self.passed is None else self.passed[index]
-            return Batch(self.kind[index], self.defender[index], self.time[index], self.diverged[index], passed, self.n)
+            scores = None if self.scores is None else self.scores[index]
+            ends = self.kind[index], self.defender[index], self.time[index], self.diverged[index]
+            return Batch(*ends, passed, self.n, scores)
         end = int(self.kind[index]), int(self.defender[index]), float(self.time[index])
         return Outcome.of(*end, diverged=bool(self.diverged[index]))
 
@@ -109,6 +117,7 @@ def simulate_batch(
     *,
     termination: Termination = "sampled",
     passes: bool = False,
+    scores: bool = False,
     seed: int = 0,
     first_trial: int = 0,
 ) -> Batch:
@@ -134,6 +143,9 @@ def simulate_batch(
         `tadcore.simulate`.
     passes : bool
         Whether to look for games that enter a capture radius between two instants: `Batch.passed`.
+    scores : bool
+        Whether to say how far each game was from every outcome: `Batch.scores`. Every game is then played on to the
+        horizon, past its end; the outcomes are the same.
     seed, first_trial : int
         What failures and disturbances are drawn from: row r is trial ``first_trial + r``, and has the course that
         ``simulate(sc, seed=seed, trial=first_trial + r)`` has. Without any they change nothing.
@@ -141,13 +153,15 @@ def simulate_batch(
     Returns
     -------
     Batch
-        ``kind``, ``defender``, ``time``, ``diverged`` and, where asked for, ``passed``, each of length M.
+        ``kind``, ``defender``, ``time``, ``diverged`` and, where asked for, ``passed`` and ``scores``, each of length
+        M.
 
     Raises
     ------
     ScenarioError
         A shape or an entry breaks a rule, or ``termination`` is neither of the two; the field is named as in
-        ``positions[17, 2, 0]``. Continuous termination or passes are asked for, and players are disturbed.
+        ``positions[17, 2, 0]``. Continuous termination or passes are asked for, and players are disturbed, or scores
+        are asked for too.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
 
@@ -164,12 +178,19 @@ def simulate_batch(
     sight = visibility_rows(sc, visibility_radii, len(starts))
     capture = capture_rows(sc, capture_radii, len(starts))
     compare(starts, capture, sight, sc)
-    key = {"seed": as_seed(seed), "first_trial": as_trial("first_trial", first_trial)}
-    as_trial("first_trial", key["first_trial"] + max(len(starts) - 1, 0))
+    key, first = as_seed(seed), as_trial("first_trial", first_trial)
+    as_trial("first_trial", first + max(len(starts) - 1, 0))
     workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
     ending, looking = as_termination(termination), as_flag("passes", passes)
     game = game_of(sc)
     refuse_between(sc, ending, passes=looking)
+    world = core_world(sc)
+    if as_flag("scores", scores):
+        _refuse_scores(ending, passes=looking)
+        kind, defender, time, diverged, scored = game.score_batch(
+            starts, sight, capture, threads=workers, world=world, seed=key, first_trial=first
+        )
+        return Batch(kind, defender, time, diverged, None, sc.n, scored)
     kind, defender, time, diverged, passed = game.simulate_batch(
         starts,
         sight,
@@ -177,8 +198,17 @@ def simulate_batch(
         continuous=ending == "continuous",
         passes=looking,
         threads=workers,
-        world=core_world(sc),
-        seed=key["seed"],
-        first_trial=key["first_trial"],
+        world=world,
+        seed=key,
+        first_trial=first,
     )
     return Batch(kind, defender, time, diverged, passed if looking else None, sc.n)
+
+
+def _refuse_scores(termination: Termination, *, passes: bool) -> None:
+    """Refuse what looks between two instants: a score is of the instants of the grid."""
+    rule = "with scores, which compare distances at the instants of the grid"
+    if termination == "continuous":
+        raise ScenarioError("termination", termination, f'"sampled" {rule}')
+    if passes:
+        raise ScenarioError("passes", passes, f"left out {rule}")

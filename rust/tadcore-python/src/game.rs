@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use numpy::ndarray::Axis;
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -14,7 +14,7 @@ use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
 use tadcore::simulation::{self, Chances, Rules, Setup, Termination};
 use tadcore::synthesis::{Method, Options, Synthesizer};
 
-use super::arrays::{copied, entries};
+use super::arrays::{copied, entries, shaped};
 use super::equilibrium::Equilibrium;
 use super::gains::Gains;
 use super::generation::Generation;
@@ -315,6 +315,54 @@ impl Game {
                 entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
                 entries(py, ends.len(), |i| ends[i].diverged)?,
                 entries(py, ends.len(), |i| ends[i].passed)?,
+            ))
+        })
+    }
+
+    /// Outcomes of many runs, each played to T, and how far each was from every outcome: kind, defender, time, whether
+    /// the game diverged, and a row of scores (timeout, captured, intercepted, d1 … dn).
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, threads=None, stop=None, world=None, seed=0,
+        first_trial=0))]
+    // A keyword for each rule.
+    #[allow(clippy::type_complexity, clippy::too_many_arguments)]
+    fn score_batch<'py>(
+        &self,
+        py: Python<'py>,
+        positions: PyReadonlyArray3<'py, f64>,
+        visibility_radii: PyReadonlyArray2<'py, f64>,
+        capture_radii: PyReadonlyArray2<'py, f64>,
+        threads: Option<usize>,
+        stop: Option<&Stop>,
+        world: Option<&Bound<'py, World>>,
+        seed: u64,
+        first_trial: u64,
+    ) -> PyResult<(
+        Bound<'py, PyArray1<i8>>,
+        Bound<'py, PyArray1<i32>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<bool>>,
+        Bound<'py, PyArray2<f64>>,
+    )> {
+        guarded(|| {
+            let dim = positions.as_array().dim().2;
+            let positions = copied(py, &positions)?;
+            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let policy = self.policy(py)?;
+            let world = world.map(|world| world.get().core());
+            let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
+            let (ends, scores) = detach::stoppable(py, token, |cancel| {
+                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
+                let chances = world.map(|world| Chances { world, seed, trial: first_trial });
+                ensemble::run_scored(&policy, &batch, chances, threads, cancel)
+            })?
+            .map_err(|error| errors::run(py, &self.game, error))?;
+            let grid = self.game.grid();
+            Ok((
+                entries(py, ends.len(), |i| ends[i].outcome.code())?,
+                entries(py, ends.len(), |i| ends[i].outcome.defender())?,
+                entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
+                entries(py, ends.len(), |i| ends[i].diverged)?,
+                shaped(py, &scores, [ends.len(), ensemble::columns(self.game.n())])?,
             ))
         })
     }

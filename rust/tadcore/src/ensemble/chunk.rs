@@ -7,9 +7,10 @@
 use super::between::Watch;
 use super::block::{BLOCK, Keys, Stop, Sweep};
 use super::fates::Played;
+use super::scores::Scores;
 use super::sweep::sweep_of;
 use super::trials::Trials;
-use super::{Batch, Between, End};
+use super::{Answers, Batch, Between, End};
 use crate::cancel::CancelToken;
 use crate::error::{NoMemory, RunError};
 use crate::network::Topology;
@@ -72,10 +73,15 @@ impl<'a> Chunk<'a> {
     pub(super) fn play(
         &mut self,
         between: Between,
-        ends: &mut [End],
+        answers: Answers,
         w: &mut Worker,
         cancel: &CancelToken,
     ) -> Result<(), RunError> {
+        let Answers { ends, scores } = answers;
+        let mut scores = match scores {
+            [] => None,
+            out => Some(Scores::new(&mut self.trials, self.width, out)?),
+        };
         let mut watch = (between != Between::NOTHING).then(|| Watch::new(between, ends.len()));
         let transitions = self.trials.policy.transitions();
         let last = self.trials.policy.game().grid().steps();
@@ -85,6 +91,9 @@ impl<'a> Chunk<'a> {
             w.missing.clear();
             w.waiting.clear();
             self.trials.fail(k);
+            if let Some(scores) = &mut scores {
+                scores.look(&mut self.trials, k, ends);
+            }
             if let Some(watch) = &mut watch {
                 watch.note(&self.trials);
             }
@@ -108,7 +117,10 @@ impl<'a> Chunk<'a> {
             }
         }
         transitions.count(lookups.max(misses), misses);
-        self.trials.finish(last, ends);
+        match scores {
+            Some(scores) => scores.finish(&mut self.trials, last, ends),
+            None => self.trials.finish(last, ends),
+        }
         Ok(())
     }
 

@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 
 use super::chunk::{Chunk, Worker};
-use super::{Batch, Between, End, threads_for};
+use super::{Answers, Batch, Between, End, threads_for};
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, RunError};
 use crate::game::Game;
@@ -77,7 +77,7 @@ fn play(game: &Game, batch: &Batch, i: usize, between: Between, cancel: &CancelT
     };
     let mut ends = [End::NOT_PLAYED];
     let mut chunk = Chunk::new(&policy, &row, None, 0, 1, Width::in_use())?;
-    chunk.play(between, &mut ends, &mut Worker::new(&policy), cancel)?;
+    chunk.play(between, Answers { ends: &mut ends, scores: &mut [] }, &mut Worker::new(&policy), cancel)?;
     let [end] = ends;
     Ok(GameEnd::Played { end, time: game.grid().time_after(end.step, end.after) })
 }

@@ -13,6 +13,7 @@
 //! | max ‖z_i‖ | [`End::diverged`] | whether a trial diverges: [`crate::simulation::divergence`] |
 //! | mask, relay, ς | [`Chances`] | what fails, who is told, who is shaken: the draws of a recorded run |
 //! | exp(Cδ) | [`crate::policy::Policy`]'s transitions | one N × N matrix per (instant, topology) |
+//! | S | [`run_scored`] | how far a trial is from every outcome |
 
 mod agenda;
 mod between;
@@ -21,6 +22,7 @@ mod fates;
 mod flips;
 pub mod games;
 mod noise;
+mod scores;
 mod trials;
 
 use std::thread::available_parallelism;
@@ -35,6 +37,7 @@ use crate::simd::Width;
 use crate::simulation::{Chances, Outcome, Record, Setup, Termination};
 use chunk::{Chunk, Worker};
 use fates::Played;
+pub use scores::columns;
 use tadcore_kernels::ensemble::{block, sweep};
 
 /// Trials of one chunk at most.
@@ -157,11 +160,39 @@ pub fn run_with(
     threads: Option<usize>,
     cancel: &CancelToken,
 ) -> Result<Vec<End>, RunError> {
-    let (n, m) = (policy.game().n(), policy.game().constrained());
-    let trials = batch.len(n + 2);
     if let Some(chances) = chances.filter(|_| between != Between::NOTHING) {
         chances.world.refuse_between()?;
     }
+    Ok(checked(policy, batch, between, chances, false, threads, cancel)?.0)
+}
+
+/// The same with how far each trial was from every outcome, [`columns`] numbers each: all trials are played to T, and
+/// end as by [`run_with`].
+///
+/// # Errors
+/// As [`run_with`].
+pub fn run_scored(
+    policy: &Policy,
+    batch: &Batch,
+    chances: Option<Chances>,
+    threads: Option<usize>,
+    cancel: &CancelToken,
+) -> Result<(Vec<End>, Vec<f64>), RunError> {
+    checked(policy, batch, Between::NOTHING, chances, true, threads, cancel)
+}
+
+/// Checks every row, and plays.
+fn checked(
+    policy: &Policy,
+    batch: &Batch,
+    between: Between,
+    chances: Option<Chances>,
+    scored: bool,
+    threads: Option<usize>,
+    cancel: &CancelToken,
+) -> Result<(Vec<End>, Vec<f64>), RunError> {
+    let (n, m) = (policy.game().n(), policy.game().constrained());
+    let trials = batch.len(n + 2);
     let conditions = chances.map(|chances| chances.conditions(policy.game(), trials as u64)).transpose()?;
     let played = chances.zip(conditions.as_ref()).map(|(chances, conditions)| Played { chances, conditions });
     for i in 0..trials {
@@ -170,11 +201,15 @@ pub fn run_with(
         }
         batch.setup(i, n, m).check(policy.game())?;
     }
-    let mut ends = Vec::new();
+    let (mut ends, mut scores) = (Vec::new(), Vec::new());
     memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
+    if scored {
+        memory::grow("the scores of a batch", &mut scores, trials.saturating_mul(columns(n)), 0.0)?;
+    }
     let threads = threads_for(threads, trials.div_ceil(block::BLOCK))?;
-    play(policy, batch, played.as_ref(), between, threads, Width::in_use(), &mut ends, cancel)?;
-    Ok(ends)
+    let answers = Answers { ends: &mut ends, scores: &mut scores };
+    play(policy, batch, played.as_ref(), between, threads, Width::in_use(), answers, cancel)?;
+    Ok((ends, scores))
 }
 
 /// How many threads to start where so many could have work, and fewer where the process may not have the memory for
@@ -198,6 +233,26 @@ fn most_trials(size: usize) -> usize {
     (CHUNK_BYTES / (size_of::<f64>() * size * step_table::padded(size))).clamp(block::BLOCK, CHUNK)
 }
 
+/// Where the ends of trials are written, and their scores; no scores where none are asked for.
+struct Answers<'a> {
+    ends: &'a mut [End],
+    scores: &'a mut [f64],
+}
+
+impl<'a> Answers<'a> {
+    /// Those of chunks of so many trials.
+    fn cut(self, size: usize) -> Vec<Self> {
+        let columns = self.scores.len() / self.ends.len().max(1);
+        let mut rest = self.scores;
+        let of_chunk = |ends: &'a mut [End]| {
+            let (scores, others) = std::mem::take(&mut rest).split_at_mut(columns * ends.len());
+            rest = others;
+            Self { ends, scores }
+        };
+        self.ends.chunks_mut(size).map(of_chunk).collect()
+    }
+}
+
 /// Plays checked trials in chunks.
 #[allow(clippy::too_many_arguments, reason = "what is played, how, and where the ends go")]
 fn play(
@@ -207,24 +262,27 @@ fn play(
     between: Between,
     threads: usize,
     width: Width,
-    ends: &mut [End],
+    answers: Answers,
     cancel: &CancelToken,
 ) -> Result<(), RunError> {
+    let trials = answers.ends.len();
     // No thread without a block of trials; equal chunks, as many for each thread.
-    let threads = threads.min(ends.len().div_ceil(block::BLOCK)).max(1);
+    let threads = threads.min(trials.div_ceil(block::BLOCK)).max(1);
     let most = most_trials(policy.game().size());
-    let rounds = ends.len().div_ceil(threads.saturating_mul(most)).max(1);
-    let size = ends.len().div_ceil(threads.saturating_mul(rounds)).max(1);
-    let one = |worker: &mut Worker, (c, ends): (usize, &mut [End])| {
-        Chunk::new(policy, batch, played, c * size, ends.len(), width)?.play(between, ends, worker, cancel)
+    let rounds = trials.div_ceil(threads.saturating_mul(most)).max(1);
+    let size = trials.div_ceil(threads.saturating_mul(rounds)).max(1);
+    let chunks = answers.cut(size);
+    let one = |worker: &mut Worker, (c, answers): (usize, Answers)| {
+        let mut chunk = Chunk::new(policy, batch, played, c * size, answers.ends.len(), width)?;
+        chunk.play(between, answers, worker, cancel)
     };
-    if threads == 1 || ends.len() <= size {
+    if threads == 1 || chunks.len() <= 1 {
         let mut worker = Worker::new(policy);
-        ends.chunks_mut(size).enumerate().try_for_each(|chunk| one(&mut worker, chunk))?;
+        chunks.into_iter().enumerate().try_for_each(|chunk| one(&mut worker, chunk))?;
         return Ok(());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|_| RunError::Threads(threads))?;
-    pool.install(|| ends.par_chunks_mut(size).enumerate().try_for_each_init(|| Worker::new(policy), one))?;
+    pool.install(|| chunks.into_par_iter().enumerate().try_for_each_init(|| Worker::new(policy), one))?;
     Ok(())
 }
 
@@ -252,7 +310,8 @@ mod tests {
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![End::NOT_PLAYED; 50];
-                    play(&policy, &batch, None, Between::NOTHING, 1, width, &mut ends, &cancel).expect("a batch");
+                    let answers = Answers { ends: &mut ends, scores: &mut [] };
+                    play(&policy, &batch, None, Between::NOTHING, 1, width, answers, &cancel).expect("a batch");
                     (ends, policy.save_transitions(&cancel).expect("memory"))
                 });
                 let played: Vec<_> = played.collect();
@@ -319,10 +378,18 @@ mod tests {
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![End::NOT_PLAYED; trials];
-                    let played = Played { chances, conditions: &conditions };
-                    play(&policy, &batch, Some(&played), Between::NOTHING, 1, width, &mut ends, &cancel)
+                    let played = Some(Played { chances, conditions: &conditions });
+                    let answers = Answers { ends: &mut ends, scores: &mut [] };
+                    play(&policy, &batch, played.as_ref(), Between::NOTHING, 1, width, answers, &cancel)
                         .expect("a batch");
-                    (ends, policy.save_transitions(&cancel).expect("memory"))
+                    let table = policy.save_transitions(&cancel).expect("memory");
+                    let (mut scored, mut scores) = (vec![End::NOT_PLAYED; trials], vec![0.0; trials * columns(n)]);
+                    let answers = Answers { ends: &mut scored, scores: &mut scores };
+                    play(&policy, &batch, played.as_ref(), Between::NOTHING, 1, width, answers, &cancel)
+                        .expect("scores");
+                    assert_eq!(ends, scored, "{interaction:?} {n} {dim} {which}");
+                    let scores: Vec<u64> = scores.into_iter().map(f64::to_bits).collect();
+                    (ends, table, scores)
                 });
                 let played: Vec<_> = played.collect();
                 assert!(played.windows(2).all(|pair| pair[0] == pair[1]), "{interaction:?} {n} {dim} {which}");
