@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import Floats, as_index
 from tadcore._shared.calls import public
 from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
@@ -86,33 +86,76 @@ def certified_map(
     >>> found.at([[-2.0, 2.0]])
     (array([1], dtype=int8), array([-1], dtype=int32))
     """
-    sc = as_scenario(sc)
-    _refuse(sc)
-    player = one_of("player", label(player), sc.players)
-    low, high = np.transpose([_range("x", x), _range("y", y)]).tolist()
-    longer = max(high[0] - low[0], high[1] - low[1])
-    least = longer / _FINE if resolution is None else _positive("resolution", resolution)
-    workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
-    cells = _core.Cells(
-        game_of(sc),
-        sc.positions,
-        sc.visibility_radii,
-        sc.capture_radii,
-        player=sc.players.index(player),
-        low=low,
-        high=high,
-        resolution=least,
-        budget=as_index("budget", budget, _MOST_CELLS, least=1),
-    )
-    for _ in bar(_advances(cells, workers), f"certified map of {player}", show=progress):
+    proving = Proving(sc, player, x=x, y=y, resolution=resolution, budget=budget, threads=threads)
+    for _ in bar(_advances(proving), f"certified map of {proving.player}", show=progress):
         pass
-    return _result(sc, player, cells.leaves(), least, cells.counts)
+    return proving.result()
 
 
-def _advances(cells: _core.Cells, threads: int | None) -> Iterator[int]:
-    """Go through the cells, some thousands at once."""
-    while not cells.done:
-        yield from range(cells.advance(_TOGETHER, threads=threads))
+class Proving:
+    """A certified map in the making; `certified_map` has the arguments.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        The game.
+    player : str
+        Whose start varies.
+    """
+
+    def __init__(
+        self,
+        sc: ScenarioLike,
+        player: str,
+        *,
+        x: tuple[float, float],
+        y: tuple[float, float],
+        resolution: float | None,
+        budget: int,
+        threads: int | None,
+    ) -> None:
+        self.scenario = sc = as_scenario(sc)
+        _refuse(sc)
+        self.player = player = one_of("player", label(player), sc.players)
+        low, high = np.transpose([_range("x", x), _range("y", y)]).tolist()
+        longer = max(high[0] - low[0], high[1] - low[1])
+        self._least = longer / _FINE if resolution is None else _positive("resolution", resolution)
+        self._threads = None if threads is None else as_index("threads", threads, 2**16, least=1)
+        self._cells = _core.Cells(
+            game_of(sc),
+            sc.positions,
+            sc.visibility_radii,
+            sc.capture_radii,
+            player=sc.players.index(player),
+            low=low,
+            high=high,
+            resolution=self._least,
+            budget=as_index("budget", budget, _MOST_CELLS, least=1),
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether every box is settled."""
+        return self._cells.done
+
+    def advance(self, boxes: int, stop: _core.Stop | None = None) -> int:
+        """Look at the next boxes, at most so many; how many it were."""
+        return self._cells.advance(boxes, threads=self._threads, stop=stop)
+
+    def settled(self) -> tuple[Floats, NDArray[np.int8], NDArray[np.int32]]:
+        """The boxes that are settled by now: corners (L, 4), kind, below 0 where nothing is proved, and defender."""
+        corners, _, kind, defender = self._cells.leaves()
+        return corners, kind, defender
+
+    def result(self) -> CertifiedMap:
+        """The map, once every box is settled."""
+        return _result(self.scenario, self.player, self._cells.leaves(), self._least, self._cells.counts)
+
+
+def _advances(proving: Proving) -> Iterator[int]:
+    """Go through the boxes, some thousands at once."""
+    while not proving.done:
+        yield from range(proving.advance(_TOGETHER))
 
 
 def _result(

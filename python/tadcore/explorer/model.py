@@ -44,6 +44,7 @@ class Explorer:
     def __init__(self, sc: Scenario) -> None:
         self.scenario = sc
         self.trial = 0
+        self.chosen = "attacker"
         self.run: Recorded = until_divergence(simulate(sc))
         self.time = self.run.outcome.time
         self.plane = (0, 1)
@@ -60,11 +61,29 @@ class Explorer:
         """The projections there are."""
         return ("xy",) if self.scenario.dim == 2 else ("xy", "xz", "yz")
 
-    def move(self, player: str, x: float, y: float, *, preview: bool = False) -> None:
-        """Start a player elsewhere in the plane that is shown; where it stands along a third axis stays."""
+    def choose(self, player: str) -> None:
+        """Choose the player whose map is shown and whom keys move."""
+        self.start_of(player)
+        self.chosen = player
+
+    def start_of(self, player: str) -> Floats:
+        """Where a player starts, shape (dim,); raises `ScenarioError` where there is no such player."""
         if player not in self.scenario.players:
             raise ScenarioError("player", player, f"one of {', '.join(self.scenario.players)}")
-        place = self.scenario.positions[self.scenario.players.index(player)].copy()
+        return np.array(self.scenario.positions[self.scenario.players.index(player)])
+
+    def nudge(self, across: float, up: float, *, preview: bool = False) -> None:
+        """Move the start of the chosen player in the plane that is shown."""
+        x, y = self.flat(self.start_of(self.chosen)).tolist()
+        self.move(self.chosen, round(x + across, 9), round(y + up, 9), preview=preview)
+
+    def put(self, path: str, value: object) -> None:
+        """Give any field another value: a weight, the horizon."""
+        self._change({path: value})
+
+    def move(self, player: str, x: float, y: float, *, preview: bool = False) -> None:
+        """Start a player elsewhere in the plane that is shown; where it stands along a third axis stays."""
+        place = self.start_of(player)
         place[list(self.plane)] = x, y
         self._change({f"{player}.position": tuple(place.tolist())}, preview=preview)
 

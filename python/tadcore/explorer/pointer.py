@@ -39,6 +39,10 @@ class Pointer:
             self._drag(x, y)
             self._after(_PAUSE, self._pause)
 
+    def rest(self) -> None:
+        """Something moved without the pointer: a pause follows, unless more moves before."""
+        self._after(_PAUSE, self._pause)
+
     def _after(self, milliseconds: int, action: Callable[[], None]) -> None:
         """Do something later, instead of what was to be done later until now."""
         if self.document is None:

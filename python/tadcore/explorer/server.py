@@ -17,8 +17,9 @@ from tornado.web import ErrorHandler
 
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
+from .desk import Desk
 from .model import Explorer
-from .page import Page
+from .work import stop_all
 
 if TYPE_CHECKING:
     from bokeh.document import Document
@@ -62,7 +63,7 @@ def server(sc: ScenarioLike, port: int = 0) -> BaseServer:
     Explorer(start)  # refuse a bad scenario here and not in the first visitor's browser
 
     def visit(document: Document) -> None:
-        Page(Explorer(start)).add_to(document)
+        Desk(Explorer(start)).add_to(document)
 
     sockets, port = bind_sockets(_ADDRESS, port)
     hosts = frozenset(f"{name}:{port}" for name in ("localhost", _ADDRESS))
@@ -103,3 +104,4 @@ def serve(sc: ScenarioLike, *, port: int = 0, browse: bool = True, ready: Callab
         pass
     finally:
         running.stop()
+        stop_all()

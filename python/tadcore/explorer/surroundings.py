@@ -64,6 +64,11 @@ def tables_of(sc: Scenario, values: Mapping[str, float]) -> dict[str, dict[str, 
     return {table: fields or None for table, fields in found.items()}
 
 
+def show_value(slider: Slider, there: bool) -> None:
+    """Let a slider stand for a number, or, where a switch says ∞, for none."""
+    slider.disabled, slider.show_value = not there, there
+
+
 class Surroundings:
     """The sliders; ``changed`` is called with all values when one of them is moved."""
 
@@ -91,7 +96,8 @@ class Surroundings:
         for path, value in surroundings_of(sc).items():
             if path in self.sliders:
                 slider, switch = self.sliders[path]
-                switch.active = slider.disabled = math.isinf(value)
+                switch.active = math.isinf(value)
+                show_value(slider, not switch.active)
                 if math.isfinite(value):
                     slider.update(start=min(slider.start, value), end=max(slider.end, value), value=value)
         self._quiet = False
@@ -101,6 +107,6 @@ class Surroundings:
             return
         values = {path: 0.0 if path == RADIUS else math.inf for path in _TITLES}
         for path, (slider, switch) in self.sliders.items():
-            slider.disabled = bool(switch.active)
+            show_value(slider, not switch.active)
             values[path] = math.inf if switch.active else float(slider.value)
         self._changed(values)

@@ -23,7 +23,7 @@ from bokeh.document import Document  # noqa: E402
 from bokeh.models import PointDrawTool  # noqa: E402
 
 from tadcore.cli.app import main  # noqa: E402
-from tadcore.explorer import Explorer, Page  # noqa: E402
+from tadcore.explorer import Desk, Explorer, Page  # noqa: E402
 from tadcore.explorer.pointer import Pointer  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -84,7 +84,7 @@ def test_dragging_the_rim_changes_the_radius(page):
     page.drag(-1.0, 2.5)
     page.drop()
     assert page.explorer.scenario.defenders[2].visibility_radius == 2.5
-    assert page._zeta["d3"][0].value == 2.5
+    assert page.radii.zeta["d3"][0].value == 2.5
     discs = page.sources["discs"].data
     assert discs["r"][discs["player"].index("d3")] == 2.5
 
@@ -112,11 +112,11 @@ def test_the_time_slider_moves_everyone(page):
     now = page.sources["now"].data
     np.testing.assert_array_equal(np.column_stack([now["x"], now["y"]]), run.position[k])
     assert page.sources["sight"].data["player"].count("d2") == run.adjacency[k, 1].sum() == 4
-    assert [mark.location for mark in page.marks] == [run.times[k]] * 3
+    assert [mark.location for mark in page.feed.marks] == [run.times[k]] * 3
 
 
 def test_switching_a_limit_off(page):
-    slider, switch = page._zeta["d2"]
+    slider, switch = page.radii.zeta["d2"]
     switch.active = True
     assert math.isinf(page.explorer.scenario.defenders[1].visibility_radius)
     assert slider.disabled
@@ -125,7 +125,7 @@ def test_switching_a_limit_off(page):
     assert page.explorer.scenario.defenders[1].visibility_radius == 2.25
     slider.value = 3.0
     assert page.explorer.scenario.defenders[1].visibility_radius == 3.0
-    page._sigma["d1"].value = 0.3
+    page.radii.sigma["d1"].value = 0.3
     assert page.explorer.scenario.capture_radii[0] == 0.3
 
 
@@ -146,7 +146,9 @@ def test_exports_are_what_is_on_the_page(page):
 
 def test_a_document_holds_the_tool_that_drags(page):
     document = Document()
-    page.add_to(document)
+    desk = Desk(page.explorer)
+    desk.add_to(document)
+    page = desk.page
     (tool,) = document.select({"type": PointDrawTool})
     assert {renderer.data_source for renderer in tool.renderers} == {page.sources["starts"], page.sources["handles"]}
     assert document.title == "tadcore explorer"
@@ -155,10 +157,11 @@ def test_a_document_holds_the_tool_that_drags(page):
 
 @pytest.mark.parametrize("name", ["paper-i2", "paper-i1-full"])
 def test_every_kind_of_game_has_a_page(name):
-    page = Page(Explorer(tadcore.scenarios.load(name)))
-    page.add_to(Document())
+    desk = Desk(Explorer(tadcore.scenarios.load(name)))
+    desk.add_to(Document())
+    page = desk.page
     assert str(page.explorer.run.outcome) in page.status.text
-    assert set(page._zeta) == set(page.explorer.scenario.constrained)
+    assert set(page.radii.zeta) == set(page.explorer.scenario.constrained)
 
 
 def test_little_is_sent_for_a_drag(page):
@@ -278,18 +281,18 @@ def address():
 
 
 def test_a_refused_slider_goes_back_to_what_is_played(page):
-    slider, switch = page._zeta["d3"]
+    slider, switch = page.radii.zeta["d3"]
     own = slider.value
     slider.value = 0.1
     assert "visibility_radius: got 0.1, must be larger than the capture radius" in page.status.text
     assert slider.value == own == page.explorer.scenario.defenders[2].visibility_radius
     assert not switch.active
-    capture = page._sigma["d3"]
+    capture = page.radii.sigma["d3"]
     own = capture.value
     capture.value = 0.6 if own != 0.6 else 0.59
     played = page.explorer.scenario.defenders[2]
     assert capture.value == played.capture_radius
-    page._sigma["d1"].value = 0.3
+    page.radii.sigma["d1"].value = 0.3
     assert page.explorer.scenario.defenders[0].capture_radius == 0.3, "and is of use again"
 
 
@@ -381,8 +384,6 @@ def test_in_a_real_browser(address, tmp_path):
         view.wait_for_function(f"{said} === '{expected}'", timeout=20_000)
         during = view.evaluate(said)
         view.mouse.up()
-        view.wait_for_timeout(500)
-        view.screenshot(path=tmp_path / "explorer.png")
         with view.expect_download() as caught:
             view.get_by_text("Scenario as TOML").click()
         caught.value.save_as(tmp_path / "mine.toml")
@@ -392,6 +393,58 @@ def test_in_a_real_browser(address, tmp_path):
     assert moved.defenders[1].position == pytest.approx((1.5, -0.5), abs=0.02)
     assert str(tadcore.simulate(moved).outcome) in during, "the outcome is there before the mouse is let go"
     assert "d1 intercepts the attacker at t = 1.395" not in during
+
+
+def read(view, name, wanted):
+    """Wait until a text is as wanted; of the last page, since the browser remembers those that were left."""
+    text = f"[...Bokeh.documents[0]._all_models.values()].filter((model) => model.name == '{name}').at(-1).text"
+    view.wait_for_function(f"new RegExp({wanted!r}).test({text})", timeout=30_000)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_keys_maps_files_and_narrow_windows_in_a_real_browser(address, tmp_path):
+    api = pytest.importorskip("playwright.sync_api")
+    start = tadcore.scenarios.load("paper-i1")
+    with api.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        view = browser.new_page(viewport={"width": 1340, "height": 900})
+        trouble = []
+        view.on("pageerror", lambda error: trouble.append(str(error)))
+        view.goto(address)
+        view.wait_for_function("window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
+        for key in ("ArrowRight", "ArrowRight", "Shift+ArrowDown"):
+            view.keyboard.press(key)
+        moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5)})).outcome
+        read(view, "status", f"^<b>{moved}</b>$")
+        view.keyboard.press("n")
+        view.keyboard.press("ArrowUp")
+        moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05)})).outcome
+        read(view, "status", f"^<b>{moved}</b>$")
+        time = "Bokeh.documents[0].get_model_by_name('play').active"
+        view.keyboard.press(" ")
+        view.wait_for_function(time)
+        view.keyboard.press(" ")
+        view.wait_for_function(f"!{time}")
+        view.get_by_text("outcome map", exact=True).click()
+        read(view, "map", r"^by the start of d1: .*by d\d$")
+        view.get_by_text("certified map", exact=True).click()
+        read(view, "map", r"proved: \d+\.\d % of the area so far$")
+        view.get_by_text("certified map", exact=True).click()
+        read(view, "map", r"^by the start of d1: .*by d\d$")
+        mine = tmp_path / "mine.toml"
+        given = start.replace({"horizon": 1.0})
+        for text, said in (
+            (given.to_toml(), f"^<b>{tadcore.simulate(given).outcome}</b>$"),
+            (given.to_toml().replace("horizon = 1.0", "horizon = -1.0"), "horizon: got -1.0, must be"),
+        ):
+            mine.write_text(text, encoding="utf-8")
+            view.locator("input[type=file]").set_input_files(mine)
+            read(view, "status", said)
+        view.set_viewport_size({"width": 420, "height": 900})
+        view.wait_for_function("document.documentElement.scrollWidth <= 421")
+        browser.close()
+    assert trouble == []
 
 
 def test_the_page_is_served_to_this_machine(address):

@@ -31,7 +31,7 @@ def plays(page, changes, trial=0):
 
 def test_links_are_switched_on_stretched_and_off():
     page = page_of()
-    slider, switch = page._around.sliders[RADIUS]
+    slider, switch = page.around.sliders[RADIUS]
     assert (slider.value, switch.active, page.trial.visible) == (0.0, False, False)
     slider.value = 2.0
     assert plays(page, {RADIUS: 2.0}).relayed.any()
@@ -47,7 +47,7 @@ def test_links_are_switched_on_stretched_and_off():
 def test_mean_times_are_chosen_and_trials_drawn():
     page = page_of()
     for path, value in (("sensing.mean_time_to_repair", 0.2), ("sensing.mean_time_to_failure", 0.5)):
-        slider, switch = page._around.sliders[path]
+        slider, switch = page.around.sliders[path]
         assert switch.active
         switch.active = False
         slider.value = value
@@ -59,12 +59,12 @@ def test_mean_times_are_chosen_and_trials_drawn():
     assert not np.array_equal(plays(page, changes, trial=3).adjacency, first.adjacency)
     # A link's mean times say nothing without a link, and are there as soon as there is one.
     for path, value in (("communication.mean_time_up", 0.3), (RADIUS, 2.0)):
-        slider, switch = page._around.sliders[path]
+        slider, switch = page.around.sliders[path]
         switch.active = False
         slider.value = value
     plays(page, changes | {"communication": {"radius": 2.0, "mean_time_up": 0.3}}, trial=3)
-    page._around.sliders["sensing.mean_time_to_failure"][1].active = True
-    page._around.sliders["communication.mean_time_up"][1].active = True
+    page.around.sliders["sensing.mean_time_to_failure"][1].active = True
+    page.around.sliders["communication.mean_time_up"][1].active = True
     plays(page, {RADIUS: 2.0})
     assert not page.trial.visible
 
@@ -76,12 +76,12 @@ def test_sliders_begin_at_what_the_scenario_says_and_keep_the_rest():
         "d1.communication.radius": 0.5,
     }
     page = page_of(given)
-    values = {path: math.inf if s[1].active else s[0].value for path, s in page._around.sliders.items()}
+    values = {path: math.inf if s[1].active else s[0].value for path, s in page.around.sliders.items()}
     assert values == surroundings_of(page.explorer.scenario)
-    assert page._around.sliders[RADIUS][0].end == 15.0
+    assert page.around.sliders[RADIUS][0].end == 15.0
     sc = page.explorer.scenario
     assert sc.replace(tables_of(sc, values)) == sc
-    page._around.sliders[RADIUS][0].value = 1.5
+    page.around.sliders[RADIUS][0].value = 1.5
     plays(page, given | {"communication": given["communication"] | {"radius": 1.5}})
     assert page.explorer.scenario.communication.relays == 1
     assert page.explorer.scenario.defenders[0].communication.radius == 0.5
@@ -89,9 +89,9 @@ def test_sliders_begin_at_what_the_scenario_says_and_keep_the_rest():
 
 def test_what_is_refused_goes_back_and_a_team_of_one_has_no_links():
     page = page_of({"d1.communication": {"mean_time_up": 1.0}, RADIUS: 1.0})
-    page._around.sliders[RADIUS][0].value = 0.0  # d1's own mean time would say nothing
+    page.around.sliders[RADIUS][0].value = 0.0  # d1's own mean time would say nothing
     assert "mean_time_up" in page.status.text
-    assert page._around.sliders[RADIUS][0].value == page.explorer.scenario.communication.radius == 1.0
+    assert page.around.sliders[RADIUS][0].value == page.explorer.scenario.communication.radius == 1.0
     sc = tadcore.scenarios.load("paper-i1")
     alone = sc.replace({"defenders": [sc.defenders[0].model_dump(exclude_unset=True)]} | COARSE)
-    assert not [path for path in Page(Explorer(alone))._around.sliders if path.startswith("communication")]
+    assert not [path for path in Page(Explorer(alone)).around.sliders if path.startswith("communication")]

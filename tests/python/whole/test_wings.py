@@ -14,8 +14,9 @@ import tadcore
 SOURCES = Path(tadcore.__file__).parent
 FLOORS = (
     ("cli",),
+    ("explorer",),
     ("analysis",),
-    ("study", "verification", "reproduce", "explorer"),
+    ("study", "verification", "reproduce"),
     ("simulation", "report"),
     ("plotting",),
     ("statistics",),
