@@ -24,6 +24,8 @@ from .analysis.maps import OutcomeMap as OutcomeMap, outcome_map as outcome_map
 from .analysis.placement import BestStart as BestStart, best_start as best_start
 from .analysis.probabilities import ProbabilityMap as ProbabilityMap, probability_map as probability_map
 from .analysis.radius import radius_curve as radius_curve
+from .analysis.rare_events import rare as rare
+from .analysis.rarity import RareEvent as RareEvent
 from .analysis.sweeps import SweepResult as SweepResult, sweep as sweep
 from .errors import (
     NoEquilibriumError as NoEquilibriumError,

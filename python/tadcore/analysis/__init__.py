@@ -11,6 +11,8 @@ from .maps import OutcomeMap, outcome_map
 from .placement import BestStart, best_start
 from .probabilities import ProbabilityMap, probability_map
 from .radius import radius_curve
+from .rare_events import rare
+from .rarity import RareEvent
 from .sensitivities import sensitivity
 from .starts import start_share
 from .sweeps import SweepResult, sweep
@@ -22,6 +24,7 @@ __all__ = [
     "OutcomeMap",
     "ProbabilityMap",
     "RadiusCurve",
+    "RareEvent",
     "Sensitivity",
     "SweepResult",
     "best_radii",
@@ -31,6 +34,7 @@ __all__ = [
     "outcome_map",
     "probability_map",
     "radius_curve",
+    "rare",
     "sensitivity",
     "sobol",
     "start_share",

@@ -22,6 +22,7 @@ from .maps import draw_map, write_report
 from .options import FAILED, set_backend_aside
 from .paper import reproduce
 from .pictures import animate, compare
+from .rare import rare
 from .runs import scenarios, simulate, validate
 from .store import store
 from .study import study
@@ -79,6 +80,7 @@ for name, command, summary in (
     ("report", write_report, "Write a finished study as an HTML page."),
     ("curve", curve, "Play a study at many radii of a player."),
     ("sweep", sweep, "Run a study at every point of a grid."),
+    ("rare", rare, "Estimate the probability of a rare outcome."),
     ("compare", compare, "Lay two runs over one another."),
     ("animate", animate, "Write a run as moving pictures."),
     ("explore", explore, "Drag players and radii on a page in the browser."),

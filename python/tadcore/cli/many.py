@@ -53,7 +53,7 @@ def curve(
     with np.errstate(all="ignore"):  # ends that are none are left to the curve to refuse
         grid = np.linspace(*radii)
     options: dict[str, Any] = {"player": player, "radii": grid, "kind": kind, "progress": progress and not hushed()}
-    wanted = _read(file)
+    wanted = read_study(file)
     with naming(**options | {"radii": radii}):
         found = radius_curve(wanted, **options)
     say(f"{kind} radius of {player}, {found.trials:,} trials at each; {percent(found.level)} intervals, all at once")
@@ -106,7 +106,7 @@ def sweep(
         if not equals:
             raise ScenarioError("--over", one, "PATH=VALUES, such as horizon=[2, 4, 6]")
         grid[path.strip()] = parse_toml(f"value = {values}", f"--over {path}")["value"]
-    found = run(_read(file), grid, progress=progress and not hushed(), store=store)
+    found = run(read_study(file), grid, progress=progress and not hushed(), store=store)
     for cell in found.cells:
         say(", ".join(f"{path} = {value}" for path, value in cell.values.items()))
         if cell.result is None:
@@ -126,7 +126,8 @@ def _plain(made: Any) -> Any:
     return made.drop_vars([name for name in made.coords if name not in made.dims and name != "status"])
 
 
-def _read(file: str) -> Study:
+def read_study(file: str) -> Study:
+    """The study of a file, or of standard input."""
     from tadcore.study.study import Study
 
     return Study.from_toml_string(read_stdin(), name="standard input") if file == STDIN else Study.from_toml(file)

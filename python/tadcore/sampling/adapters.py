@@ -53,6 +53,18 @@ class Quantiles(Sampler):
         quantiles = getattr(self.distribution, "ppf", None) or self.distribution.icdf
         return _shaped(repr(self)[1:-1], quantiles(block.points), len(block.points), components, broadcast=True)
 
+    def from_normal(self, normal: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+        """Quantiles from the nearer end, so that either tail is followed as far as doubles go."""
+        upper = getattr(self.distribution, "isf", None) or getattr(self.distribution, "iccdf", None)
+        if upper is None:
+            return super().from_normal(normal, components)
+        from scipy.special import ndtr
+
+        right, name, size = normal > 0.0, repr(self)[1:-1], len(normal)
+        values = self.draw(Block(ndtr(np.minimum(normal, 0.0)), np.random.default_rng(0), 0), components)
+        tail = upper(ndtr(-np.maximum(normal, 0.0)))
+        return np.where(right, _shaped(name, tail, size, components, broadcast=True), values)
+
     def bounds(self) -> tuple[float, float]:
         """The support."""
         low, high = self.distribution.support()

@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import as_plain_array, as_real
 from tadcore.errors import ScenarioError
 
+LOWEST, HIGHEST = 2.0**-54, 1.0 - 2.0**-53
+"""The ends of the open unit interval."""
+
 
 class Block(NamedTuple):
     """What a sampler draws from: one chunk of trials."""
@@ -38,6 +41,21 @@ class Sampler(abc.ABC):
     @abc.abstractmethod
     def draw(self, block: Block, components: int) -> NDArray[np.float64]:
         """Values of shape (trials, components)."""
+
+    def from_normal(self, normal: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+        """Values of the same law from independent standard normal numbers, by quantiles.
+
+        Parameters
+        ----------
+        normal : ndarray, shape (trials, coordinates)
+            The numbers.
+        components : int
+            As of `draw`.
+        """
+        from scipy.special import ndtr
+
+        points = np.clip(ndtr(normal), LOWEST, HIGHEST)
+        return self.draw(Block(points, np.random.default_rng(0), 0), components)
 
     def check(self, field: str, components: int) -> None:  # noqa: B027 (what has no own shape fits everything)
         """Raise `ScenarioError` where the sampler does not fit the quantity that ``field`` names."""

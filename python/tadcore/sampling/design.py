@@ -20,6 +20,8 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from .base import HIGHEST, LOWEST
+
 CHUNK = 8192
 """Trials in a chunk; a constant, since the draws depend on it."""
 
@@ -30,7 +32,6 @@ Design: TypeAlias = Literal["random", "sobol", "latin"]
 DESIGNS: tuple[str, ...] = get_args(Design)
 
 _SOBOL_BITS = 32  # the most that SciPy can skip through
-_LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53
 
 
 def generator(seed: int, chunk: int, purpose: int) -> np.random.Generator:
@@ -58,7 +59,7 @@ def unit_points(design: Design, seed: int, chunk: int, layout: Sequence[tuple[in
     """
     if design == "random":
         drawn = [generator(seed, chunk, purpose).random((CHUNK, wanted)) for purpose, wanted in layout]
-        return [np.maximum(points, _LOWEST) for points in drawn]
+        return [np.maximum(points, LOWEST) for points in drawn]
     axes = sum(wanted for _, wanted in layout)
     if not axes:
         return [np.empty((CHUNK, 0)) for _ in layout]
@@ -81,7 +82,7 @@ def _latin(axes: int, seed: int, chunk: int) -> NDArray[np.float64]:
     from scipy.stats import qmc
 
     points: NDArray[np.float64] = qmc.LatinHypercube(axes, rng=_scrambler(seed, chunk)).random(CHUNK)
-    return np.clip(points, _LOWEST, _HIGHEST)
+    return np.clip(points, LOWEST, HIGHEST)
 
 
 def _scrambler(seed: int, *chunk: int) -> np.random.Generator:

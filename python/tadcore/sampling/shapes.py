@@ -215,9 +215,12 @@ class Gaussian(Parameters):
         """By quantiles; sums are written out, since a library product may round by the number of rows."""
         from scipy.special import ndtri
 
-        normal = ndtri(block.points)
+        return self.from_normal(ndtri(block.points), components)
+
+    def from_normal(self, normal: NDArray[np.float64], components: int) -> NDArray[np.float64]:
+        """Linear in the numbers."""
         if self.std is not None:
-            return np.asarray(self.mean) + np.asarray(self.std) * normal  # type: ignore[no-any-return]
+            return np.asarray(self.mean) + np.asarray(self.std) * normal
         factor = np.linalg.cholesky(np.asarray(self.cov))
         rows = [sum(factor[i, j] * normal[:, j] for j in range(i + 1)) for i in range(components)]
         return np.asarray(self.mean) + np.stack(rows, axis=1)  # type: ignore[no-any-return]

@@ -32,6 +32,8 @@ def made():
     yield tadcore.simulate_batch(SC, [SC.positions] * 3)
     yield tadcore.outcome_map(SC, x=(-2, 2, 3), y=(-2, 2, 3))
     yield tadcore.certified_map(SC, x=(-2, 2), y=(-2, 2), resolution=0.5)
+    start = {"attacker.position": sampling.Gaussian([-0.7, 0.7], 0.1)}
+    yield tadcore.rare(tadcore.Study(SC, start, trials=1), error=0.5)
     yield tadcore.sweep(study, {"horizon": [0.5, 1.0]})
     yield tadcore.radius_curve(result, player="d2", radii=[1.0, 2.0, 3.0], refine=True)
     yield from (result.probabilities(), result.incidence(), tadcore.HalfWidth(0.1), tadcore.verify(SC))

@@ -14,6 +14,7 @@ MODULES += [
     ".analysis.sweeps",
     ".analysis.maps",
     ".analysis.certified",
+    ".analysis.rare_events",
 ]
 MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
 MODULES += [".verification.every_check", ".verification.continuous.events"]

@@ -1,0 +1,64 @@
+"""The trials of a study as functions of standard normal numbers: samplers by quantiles, games by their scores."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tadcore._shared.arrays import Floats, Integers
+from tadcore.errors import ScenarioError
+from tadcore.game.outcome import OutcomeKind
+from tadcore.scenario.quantities import setups
+from tadcore.statistics.outcomes import outcome_names
+from tadcore.study.study import Study
+
+
+class NormalInputs:
+    """Scores of an event for points of independent standard normal numbers, one row for each game.
+
+    Raises
+    ------
+    ScenarioError
+        A sampler has no quantiles, or what varies makes every trial a game of its own.
+    """
+
+    def __init__(self, study: Study, event: str, threads: int | None) -> None:
+        self._plan, self._threads = study.plan, threads
+        sc = study.scenario
+        self._column = outcome_names(sc.n).index(event)
+        self._layout = []
+        for quantity, sampler in self._plan.varied:
+            field = f'vary["{quantity.path}"]'
+            if quantity.of_game:
+                raise ScenarioError(field, sampler, "left out for rare events: it makes every trial a game of its own")
+            coordinates = sampler.coordinates(quantity.components)
+            if not sampler.by_points or not coordinates:
+                rule = (
+                    "a sampler with quantiles for rare events, such as Gaussian, Box or a distribution of scipy.stats"
+                )
+                raise ScenarioError(field, sampler, rule)
+            self._layout.append((sampler, quantity.components, coordinates))
+        self.dim: int = sum(coordinates for _, _, coordinates in self._layout)
+
+    def inputs(self, normal: Floats) -> Floats:
+        """What the samplers make of the numbers, one column for each varied component."""
+        ends = np.cumsum([coordinates for _, _, coordinates in self._layout])
+        parts = np.split(normal, ends[:-1], axis=1)
+        drawn = [
+            sampler.from_normal(np.ascontiguousarray(part), components)
+            for part, (sampler, components, _) in zip(parts, self._layout, strict=True)
+        ]
+        return np.concatenate(drawn, axis=1)
+
+    def __call__(self, normal: Floats) -> tuple[Floats, Integers]:
+        """Play the games; their scores, and the intercepting defender of each or -1."""
+        inputs = self.inputs(normal)
+        try:
+            self._plan.check(0, inputs)
+        except ScenarioError as error:
+            path, rule = error.field.partition(", trial")[0], "also far in the tail of its law: truncate the sampler"
+            raise ScenarioError(f"a draw of {path}", error.value, f"{error.rule}, {rule}") from None
+        setup = setups(self._plan.scenario, self._plan.quantities, inputs)
+        starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
+        kind, defender, _, _, scores = self._plan.game.score_batch(starts, sight, capture, threads=self._threads)
+        who = np.where(kind == OutcomeKind.INTERCEPTED, defender, -1)
+        return np.ascontiguousarray(scores[:, self._column]), who.astype(np.int64)
