@@ -1,4 +1,4 @@
-r"""The value of a radius: outcome probabilities against the visibility radius or the capture radius of one player.
+r"""The value of a radius: outcome probabilities against the visibility or capture radius of one player, or of a team.
 
 A radius is no part of the game's weights, so every radius is played with the same gains and, here, from the same M
 starts: common random numbers. The differences between radii are then differences between pairs of trials, and far
@@ -108,13 +108,15 @@ def radius_curve(
         M independent starts; required with a Scenario, and not taken with a study.
     player : str or list of str
         ``"d1"`` … ``"dn"`` (or ``"defenders[0]"`` …); in I2 ``"target"`` for its visibility, and ``"attacker"`` for its
-        capture radius. Of several, each has its curve, the others keeping their own radii.
+        capture radius; ``"d*"`` for one radius that all defenders share. Of several, each has its curve, the others
+        keeping their own radii.
     radii : array_like, shape (R,)
         Radii to play, increasing. Visibility may end in inf.
     kind : {"visibility", "capture"}
         ζ or σ.
     reference : float, optional
-        The radius to take differences against; the player's own in the scenario by default.
+        The radius to take differences against; the player's own in the scenario by default, for ``"d*"`` the radii that
+        the defenders have there.
     level : float
         Confidence level of intervals and bands; 0.95, or that of the rule that was asked when to stop the study.
     refine : bool
@@ -188,7 +190,7 @@ def _curve(
     sc, kind, trials = games.sc, games.kind, len(games.rows)
     played = [games.play(radius) for radius in bar(grid.tolist(), f"radius of {games.player}", show=progress)]
     same = np.flatnonzero(grid == own)
-    base = played[same[0]] if same.size else games.play(own)
+    base = played[same[0]] if same.size else games.play_own() if np.isnan(own) else games.play(own)
 
     lost = any(batch.diverged.any() for batch in (base, *played))
 

@@ -1,7 +1,8 @@
-"""The same trials, played at any radius or from any start of one player."""
+"""The same trials, played at any radius of one player or of the team, or from any start of one player."""
 
 from __future__ import annotations
 
+import math
 import os
 
 import numpy as np
@@ -21,6 +22,9 @@ from tadcore.statistics import TrialOutcomes
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusKind
 from tadcore.study.study import Study
+
+TEAM = "d*"
+"""All defenders, who then share one radius."""
 
 
 def refuse_random(sc: Scenario, function: str, instead: str) -> None:
@@ -56,7 +60,7 @@ def seed_of(source: ScenarioLike | Study | TrialOutcomes, seed: int) -> int:
 
 
 class Replays:
-    """The same starts, with the same failures and disturbances, at any radius of one player."""
+    """The same starts, with the same failures and disturbances, at any radius of one player, or of all defenders."""
 
     def __init__(
         self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None, seed: int = 0
@@ -65,38 +69,53 @@ class Replays:
         if not isinstance(kind, str) or kind not in ("visibility", "capture"):
             raise ScenarioError("kind", kind, 'one of "visibility" and "capture"')
         labels = sc.constrained if kind == "visibility" else (*sc.players[: sc.n], "attacker")
-        if not isinstance(player, str) or player not in labels:
-            raise ScenarioError("player", player, f"one that has a {kind} radius: {', '.join(labels)}")
-        self.column = component(sc, f"{player}.{kind}_radius").row
+        if not isinstance(player, str) or player not in (*labels, TEAM):
+            rule = f"one that has a {kind} radius: {', '.join(labels)}; or {TEAM} for all defenders together"
+            raise ScenarioError("player", player, rule)
+        team = [f"d{i + 1}" for i in range(sc.n)] if player == TEAM else [player]
+        self.columns = [component(sc, f"{one}.{kind}_radius").row for one in team]
         self.sc, self.rows, self.player, self.kind, self.threads, self.seed = sc, rows, player, kind, threads, seed
-        self.own = float((sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.column])
+        self._own = np.array(sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.columns]
+
+    @property
+    def own(self) -> float:
+        """The radius in the scenario; NaN where the defenders of a team have several."""
+        return float(self._own[0]) if (self._own == self._own[0]).all() else math.nan
+
+    def play_own(self) -> Batch:
+        """All trials with the radius, or radii, of the scenario."""
+        return self._play(self._own, slice(None))
 
     def checked(self, field: str, radii: ArrayLike) -> Floats:
         """Radii that every trial accepts, σ < ζ included."""
         values = as_real(field, radii, "positive numbers").reshape(np.shape(radii))
         for rule in OF_FIELD[f"{self.kind}_radius"]:
             refuse_where(field, values, ~rule.holds(values), rule.words)
-        if self.column < self.sc.n:
-            if self.kind == "visibility":
-                least = float(self.rows.capture_radii[..., self.column].max())
-                refuse_where(field, values, values <= least, f"larger than the player's capture radius ({least!r})")
-            else:
-                most = float(self.rows.visibility_radii[..., self.column].min())
-                refuse_where(field, values, values >= most, f"smaller than the player's visibility radius ({most!r})")
+        defenders = [column for column in self.columns if column < self.sc.n]
+        whose = "every defender's" if self.player == TEAM else "the player's"
+        if defenders and self.kind == "visibility":
+            least = float(self.rows.capture_radii[..., defenders].max())
+            refuse_where(field, values, values <= least, f"larger than {whose} capture radius ({least!r})")
+        elif defenders:
+            most = float(self.rows.visibility_radii[..., defenders].min())
+            refuse_where(field, values, values >= most, f"smaller than {whose} visibility radius ({most!r})")
         return values
 
     def play(self, radius: float | Floats, trials: NDArray[np.int64] | None = None) -> Batch:
         """All trials at one radius, or chosen trials each at its own."""
-        chosen = slice(None) if trials is None else trials
+        return self._play(np.asarray(radius)[..., np.newaxis], slice(None) if trials is None else trials)
+
+    def _play(self, radii: Floats, chosen: slice | NDArray[np.int64]) -> Batch:
+        """Chosen trials with radii of shape (1 or those of `columns`,), or (trials, 1)."""
         positions = self.rows.positions[chosen]
         visibility, capture = (
-            np.array(radii if radii.ndim == 1 else radii[chosen])
-            for radii in (self.rows.visibility_radii, self.rows.capture_radii)
+            np.array(common if common.ndim == 1 else common[chosen])
+            for common in (self.rows.visibility_radii, self.rows.capture_radii)
         )
         varied = visibility if self.kind == "visibility" else capture
-        if np.ndim(radius) and varied.ndim == 1:
+        if radii.ndim > 1 and varied.ndim == 1:
             varied = np.repeat(varied[np.newaxis], len(positions), axis=0)
-        varied[..., self.column] = radius
+        varied[..., self.columns] = radii
         sight, reach = (varied, capture) if self.kind == "visibility" else (visibility, varied)
         return simulate_batch(self.sc, positions, sight, reach, threads=self.threads, seed=self.seed)
 

@@ -16,6 +16,7 @@ import typer
 
 from tadcore.errors import ScenarioError, StoreError, TadcoreError
 
+from .best import best_radii, best_start
 from .explore import explore
 from .many import curve, sweep
 from .maps import draw_map, write_report
@@ -78,7 +79,9 @@ for name, command, summary in (
     ("study", study, "Play many games from a study file."),
     ("map", draw_map, "Draw the outcome over one player's start."),
     ("report", write_report, "Write a finished study as an HTML page."),
-    ("curve", curve, "Play a study at many radii of a player."),
+    ("curve", curve, "Play a study at many radii."),
+    ("best-start", best_start, "Search where to place a player."),
+    ("best-radii", best_radii, "Search how to share a sum of radii."),
     ("sweep", sweep, "Run a study at every point of a grid."),
     ("rare", rare, "Estimate the probability of a rare outcome."),
     ("compare", compare, "Lay two runs over one another."),

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from tadcore._shared.files import write_whole
-from tadcore._shared.shares import estimate, percent
+from tadcore._shared.shares import estimate, percent, share
 from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
 
@@ -18,6 +18,7 @@ from .options import Quiet, naming, writable
 from .terminal import hush, hushed, say, sign_of_life
 
 if TYPE_CHECKING:
+    from tadcore.statistics.radius import RadiusCurve
     from tadcore.study.study import Study
 
 _DATA = ".nc"
@@ -29,40 +30,61 @@ Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a termi
 def curve(
     file: File,
     radii: Annotated[tuple[float, float, int], typer.Option(metavar="LOW HIGH N", help="N radii from LOW to HIGH.")],
-    player: Annotated[str, typer.Option(metavar="NAME", help="Whose: d1, d2, …; target or attacker.")] = "d1",
+    player: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Whose: d1, d2, …; d* for all defenders; target, attacker. Repeatable; d1 by default."
+        ),
+    ] = None,
     kind: Annotated[str, typer.Option(metavar="KIND", help="visibility or capture.")] = "visibility",
+    at_least: Annotated[
+        float | None,
+        typer.Option("--at-least", metavar="P", help="Say at which radius P(intercepted) is surely P or more."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Figure (.png, .pdf, .svg) or data (.nc).")] = None,
     progress: Progress = True,
     quiet: Quiet = False,
 ) -> None:
-    """Play the trials of a study at many radii of one player, and print the outcome probabilities.
+    """Play the trials of a study at many radii, and print the outcome probabilities.
 
     \b
       tadcore curve my-study.toml --player d1 --radii 0.5 6 12
+      tadcore curve my-study.toml --player d1 --player d2 --radii 0.5 6 12
+      tadcore curve my-study.toml --player 'd*' --radii 0.5 6 12 --at-least 0.9
       tadcore curve my-study.toml --radii 0.5 6 40 --out curve.pdf
 
-    Intervals hold at all radii at once.
+    Only the radius of one player changes at a time, or with d* that of all defenders together. Intervals hold at all
+    radii of all players at once.
     """
     hush(quiet)
     _check(out, (".png", ".pdf", ".svg", _DATA))
     from tadcore.analysis.radius import radius_curve
-    from tadcore.statistics.outcomes import excluding
+    from tadcore.analysis.replays import TEAM
+    from tadcore.statistics.radius import RadiusCurve
 
     if not 1 <= radii[2] <= _MOST_RADII:
         raise ScenarioError("--radii", radii, f"LOW HIGH N, with N from 1 to {_MOST_RADII:,}")
     with np.errstate(all="ignore"):  # ends that are none are left to the curve to refuse
         grid = np.linspace(*radii)
-    options: dict[str, Any] = {"player": player, "radii": grid, "kind": kind, "progress": progress and not hushed()}
+    players = player or ["d1"]
+    options: dict[str, Any] = {"radii": grid, "kind": kind, "progress": progress and not hushed()}
+    options["player"] = players[0] if len(players) == 1 else players
     wanted = read_study(file)
     with naming(**options | {"radii": radii}):
         found = radius_curve(wanted, **options)
-    say(f"{kind} radius of {player}, {found.trials:,} trials at each; {percent(found.level)} intervals, all at once")
-    for r, radius in enumerate(found.radii):
-        cells = []
-        for i in excluding(found.names):
-            ends = (float(part[i, r]) for part in (found.estimate, found.band_low, found.band_high))
-            cells.append(f"{found.names[i]} {' '.join(estimate(*ends, least=3))}")
-        say(f"{radius:<10g} {'  '.join(cells)}", indent=2)
+    curves = [found] if isinstance(found, RadiusCurve) else list(found)
+    with naming(at_least=at_least):
+        smallest = [None if at_least is None else curve.smallest(at_least) for curve in curves]
+    about = f"{curves[0].trials:,} trials at each; {percent(curves[0].level)} intervals, all at once"
+    say(f"{kind} radius, {about}")
+    for curve, least in zip(curves, smallest, strict=True):
+        say(f"of {'all defenders' if curve.player == TEAM else curve.player}")
+        _table(curve)
+        if least is not None:
+            shown = f"P({least.outcome}) = {' '.join(estimate(least.estimate, least.low, least.high))}"
+            which = f"none; the best is {least.best:g}" if least.radius is None else f"{least.radius:g}"
+            say(f"smallest for {share(least.at_least, 2)}: {which}", indent=2)
+            say(f"there {shown}", indent=2)
     if out is None:
         return
     if out.suffix == _DATA:
@@ -73,8 +95,21 @@ def curve(
 
         sign_of_life("drawing")
         with for_files(), plotting.style():
-            plotting.save(root_figure(plotting.radius_curve(found)), out.with_suffix(""), formats=[out.suffix[1:]])
+            ax = plotting.radius_curve(found) if isinstance(found, RadiusCurve) else plotting.radius_curves(found)
+            plotting.save(root_figure(ax), out.with_suffix(""), formats=[out.suffix[1:]])
     say(f"written to {out}")
+
+
+def _table(curve: RadiusCurve) -> None:
+    """Print the probabilities of what excludes one another, a row for each radius, within 80 columns."""
+    from tadcore.statistics.outcomes import excluding
+
+    shown = excluding(curve.names)
+    say(f"{'radius':<8} {' '.join(f'{curve.names[i]:<22}' for i in shown)}".rstrip(), indent=2)
+    for r, radius in enumerate(curve.radii):
+        ends = ([float(part[i, r]) for part in (curve.estimate, curve.band_low, curve.band_high)] for i in shown)
+        cells = [f"{' '.join(estimate(*each, least=3)):<22}" for each in ends]
+        say(f"{radius:<8.6g} {' '.join(cells)}".rstrip(), indent=2)
 
 
 def sweep(

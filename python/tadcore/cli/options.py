@@ -78,7 +78,7 @@ def naming(**options: object) -> Iterator[None]:
         if error.field not in options or len(error.errors) > 1:
             raise
         rule = error.rule.replace("(low, high, count)", "LOW HIGH")
-        raise ScenarioError(f"--{error.field}", options[error.field], rule) from None
+        raise ScenarioError(f"--{error.field.replace('_', '-')}", options[error.field], rule) from None
 
 
 def usable(out: Path | None) -> None:

@@ -30,7 +30,7 @@ class RadiusCurve:
     Attributes
     ----------
     player : str
-        Whose radius.
+        Whose radius; ``"d*"`` for one that all defenders share.
     radius : {"visibility", "capture"}
         Which one: ζ or σ.
     radii : ndarray, shape (R,)
@@ -45,7 +45,8 @@ class RadiusCurve:
         The band of one outcome that holds at all R radii at once: Clopper and Pearson's intervals, or the confidence
         sequence's, each with 1 / R of 1 - level.
     reference : float
-        The radius that differences are taken against; the scenario's own unless another was given.
+        The radius that differences are taken against; the scenario's own unless another was given. NaN where that is
+        of a team whose defenders have several there: differences are then against these.
     difference, difference_low, difference_high : ndarray, shape (3 + n, R)
         P(r) - P(reference), paired, each interval by itself.
     slope, slope_low, slope_high : ndarray, shape (3 + n, R - 1)

@@ -297,3 +297,49 @@ def test_players_that_are_none_are_refused(sc, positions, player, said):
     both = radius_curve(sc, positions[:2], player=["d1"], radii=[1.0])
     with pytest.raises(ScenarioError, match="one of d1"):
         both["d2"]
+
+
+def test_all_defenders_share_a_radius(sc, positions):
+    radii = [0.8, 2.25, float("inf")]
+    curve = radius_curve(sc, positions, player="defenders[*]", radii=radii)
+    own = tadcore.simulate_batch(sc, positions)
+    for r, radius in enumerate(radii):
+        batch = tadcore.simulate_batch(sc.replace({"d*.visibility_radius": radius}), positions)
+        assert np.array_equal(curve.kind[r], batch.kind)
+        assert np.array_equal(curve.defender[r], batch.defender)
+        against = paired(batch.kind, batch.defender, own.kind, own.defender, 3)
+        assert np.array_equal(curve.difference[:, r], against.difference)
+    assert (curve.player, np.isnan(curve.reference)) == ("d*", True)
+    assert "visibility of d*" in repr(curve)
+    assert np.ptp(curve.estimate[2]) > 0.1
+    equal = radius_curve(sc, positions, player="d*", radii=[0.05, 0.2], kind="capture")
+    assert equal.reference == 0.1
+    batch = tadcore.simulate_batch(sc.replace({"d*.capture_radius": 0.2}), positions)
+    assert np.array_equal(equal.kind[1], batch.kind)
+    both = radius_curve(sc, positions, player=["d1", "d*"], radii=[0.8, 2.0])
+    assert both.players == ("d1", "d*")
+    assert both["d*"].band_low[2, 0] <= curve.band_low[2, 0], "four places instead of three"
+
+
+def test_radii_of_a_team_obey_the_rule_of_every_defender(sc, positions):
+    wide = sc.replace({"d2.capture_radius": 0.5})
+    with pytest.raises(ScenarioError, match=r"larger than every defender's capture radius \(0.5\)"):
+        radius_curve(wide, positions, player="d*", radii=[0.4, 1.0])
+    with pytest.raises(ScenarioError, match=r"smaller than every defender's visibility radius \(1.25\)"):
+        radius_curve(wide, positions, player="d*", radii=[0.4, 1.5], kind="capture")
+    with pytest.raises(ScenarioError, match=r"d1, d2, d3; or d\* for all defenders together"):
+        radius_curve(sc, positions, player="d4", radii=[1.0])
+
+
+def test_breakpoints_of_a_team(sc, positions):
+    curve = radius_curve(sc, positions[:20], player="d*", radii=[0.8, 1.6, 2.4], refine=True, tolerance=1e-7)
+    found = curve.breakpoints
+    assert len(found) > 0
+    for i in range(0, len(found), 3):
+        at = positions[found.trial[i] : found.trial[i] + 1]
+        ended = [
+            tadcore.simulate_batch(sc.replace({"d*.visibility_radius": radius}), at)
+            for radius in (found.radius[i] - 2e-7, found.radius[i])
+        ]
+        assert [batch.kind[0] for batch in ended] == [found.kind_before[i], found.kind_after[i]]
+        assert [batch.defender[0] for batch in ended] == [found.defender_before[i], found.defender_after[i]]

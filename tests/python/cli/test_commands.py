@@ -1,6 +1,7 @@
 """Commands that print JSON, that print nothing, and those around many games and pictures."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -98,9 +99,51 @@ def test_a_curve_is_printed_and_written(run):
     expected = tadcore.radius_curve(study, player="d1", radii=[1.0, 3.0, 5.0])
     with xr.open_dataset("curve.nc", engine="scipy") as written:
         assert np.array_equal(written["estimate"], expected.estimate)
-    assert [line.split()[0] for line in out.splitlines()[1:4]] == ["1", "3", "5"]
+    assert [line.split()[0] for line in out.splitlines()[2:6]] == ["radius", "1", "3", "5"]
+    assert max(map(len, out.splitlines())) <= 80
     assert run("curve", "study.toml", "--radii", 1, 5, 3, "--out", "curve.pdf")[0] == 0
     assert run("curve", "study.toml", "--radii", 1, 5, 3, "--out", "curve.doc")[0] == 2
+
+
+def test_curves_of_several_players_and_of_the_team(run):
+    radii = ("--radii", 1, 3, 2)
+    command = ("curve", "study.toml", "--player", "d2", "--player", "defenders[*]", *radii, "--at-least", 0.5)
+    code, out, _ = run(*command, "--out", "curves.nc")
+    assert code == 0
+    study = tadcore.Study.from_toml("study.toml")
+    expected = tadcore.radius_curve(study, player=["d2", "d*"], radii=[1.0, 3.0])
+    with xr.open_dataset("curves.nc", engine="scipy") as written:
+        assert list(written["player"].values) == ["d2", "d*"]
+        assert np.array_equal(written["estimate"], expected.to_xarray()["estimate"])
+    for player, whose in (("d2", "of d2"), ("d*", "of all defenders")):
+        part = out.partition(f"{whose}\n")[2].partition("of ")[0]
+        i = expected[player].names.index("captured")
+        assert f"{expected[player].estimate[i, 1]:.3f} [" in part
+        least = expected[player].smallest(0.5)
+        assert f"smallest for 0.50: {'none; the best is' if least.radius is None else f'{least.radius:g}'}" in part
+    assert max(map(len, out.splitlines())) <= 80
+    assert run(*command, "--out", "curves.svg")[0] == 0
+    code, out, err = run("curve", "study.toml", *radii, "--at-least", 2)
+    assert (code, out) == (2, "")
+    assert "--at-least: got 2.0, must be a probability in (0, 1)" in err
+
+
+def test_the_best_start_and_radii_are_those_of_the_package(run):
+    study = tadcore.Study.from_toml("study.toml")
+    start = ("best-start", "study.toml", "--player", "d3", "--x", -1, 1, "--y", 0, 1, "--evaluations", 25)
+    found = tadcore.best_start(study, "d3", x=(-1, 1), y=(0, 1), evaluations=25)
+    code, out, err = run(*start, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == json.loads(json.dumps(asdict(found)))
+    out = run(*start)[1]
+    assert out.startswith(f"d3 at ({found.position[0]:.4g}, {found.position[1]:.4g}), of {found.evaluations} places")
+    assert "on 40 fresh trials" in out
+    radii = ("best-radii", "study.toml", "--total", 6, "--evaluations", 25, "--outcome", "captured")
+    shared = tadcore.best_radii(study, 6.0, evaluations=25, outcome="captured")
+    assert json.loads(run(*radii, "--json")[1])["radii"] == shared.radii
+    assert f"d1 {shared.radii['d1']:.4g}, d2 {shared.radii['d2']:.4g}" in run(*radii)[1]
+    assert run(*radii, "--quiet") == (0, "", "")
+    assert "--x: got (1.0, 1.0), must be (low, high)" in run(*start[:4], "--x", 1, 1, "--y", 0, 1)[2]
 
 
 def test_a_sweep_is_printed_and_written(run):

@@ -31,7 +31,7 @@ def test_python_blocks_run_in_order(
 def test_commands_and_pictures_exist() -> None:
     text = README.read_text(encoding="utf-8")
     commands = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
-    assert set(re.findall(r"`tadcore (\w+)", text)) == commands
+    assert set(re.findall(r"`tadcore ([\w-]+)", text)) == commands
     makefile = (README.parent / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"^make (\w+)", text, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target

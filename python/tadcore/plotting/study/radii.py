@@ -68,6 +68,9 @@ def radius_curves(curves: RadiusCurves, ax: Axes | None = None, *, outcome: str 
             )  # fmt: skip
         ends.append((float(share[-1]), it.symbol, it.colour))
     letter = r"\zeta" if first.radius == "visibility" else r"\sigma"
-    ax.set(xlabel=f"${letter}$ of one player", ylabel=f"P({outcome_look(outcome).label})")
+    ax.set(
+        xlabel=f"${letter}$ of one player" + (", or of all defenders" if "d*" in curves.players else ""),
+        ylabel=f"P({outcome_look(outcome).label})",
+    )
     label_ends(ax, ends)
     return ax

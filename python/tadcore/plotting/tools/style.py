@@ -94,12 +94,14 @@ def symbol(player: str) -> str:
 
 
 def look(player: str) -> Look:
-    """Return how the player labelled ``player`` ("d1", …, "target", "attacker") is drawn."""
+    """Return how the player labelled ``player`` ("d1", …, "d*" for the team, "target", "attacker") is drawn."""
     text = f"${symbol(player)}$"
     if player == "target":
         return Look(text, ink(), "*", (0, (8, 2)))
     if player == "attacker":
         return Look(text, "#D55E00", "X", (0, (2, 1)))
+    if player == "d*":
+        return Look(text, ink(0.35), "P", (0, (4, 1, 1, 1)))
     i = int(player.removeprefix("d")) - 1
     return Look(
         text,
