@@ -29,6 +29,7 @@ math_numfig = True
 math_eqref_format = "({number})"
 
 nb_execution_mode = "force"
+nb_execution_in_temp = True  # what cells write does not stay among the pages
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
