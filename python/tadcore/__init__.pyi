@@ -26,7 +26,8 @@ from .analysis.probabilities import ProbabilityMap as ProbabilityMap, probabilit
 from .analysis.radius import radius_curve as radius_curve
 from .analysis.rare_events import rare as rare
 from .analysis.rarity import RareEvent as RareEvent
-from .analysis.sweeps import SweepResult as SweepResult, sweep as sweep
+from .analysis.sweeps import sweep as sweep
+from .analysis.swept import SweepResult as SweepResult
 from .errors import (
     NoEquilibriumError as NoEquilibriumError,
     OutOfMemoryError as OutOfMemoryError,

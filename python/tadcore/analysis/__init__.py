@@ -15,7 +15,8 @@ from .rare_events import rare
 from .rarity import RareEvent
 from .sensitivities import sensitivity
 from .starts import start_share
-from .sweeps import SweepResult, sweep
+from .sweeps import sweep
+from .swept import SweepResult
 
 __all__ = [
     "BestRadii",

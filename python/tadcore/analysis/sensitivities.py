@@ -11,7 +11,7 @@ from tadcore._core import simulate_games
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
 from tadcore._shared.text import one_of
-from tadcore.errors import ScenarioError
+from tadcore.errors import MISSING, ScenarioError
 from tadcore.game.outcome import NO_EQUILIBRIUM, UNPLAYED
 from tadcore.sampling.adapters import as_sampler
 from tadcore.sampling.base import Block, Sampler
@@ -23,6 +23,7 @@ from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 from tadcore.statistics.outcomes import indicators, outcome_names
 from tadcore.statistics.sobol import Distribution, Joint, Sensitivity, sobol
+from tadcore.study.study import Study
 from tadcore.study.vary import quantities
 
 from .replays import refuse_random
@@ -32,8 +33,8 @@ _LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open
 
 @public
 def sensitivity(
-    sc: ScenarioLike,
-    inputs: Mapping[str, Any],
+    sc: ScenarioLike | Study,
+    inputs: Mapping[str, Any] | None = None,
     *,
     points: int = 1024,
     seed: int = 0,
@@ -49,12 +50,12 @@ def sensitivity(
 
     Parameters
     ----------
-    sc : Scenario, path or name
-        What holds where nothing varies.
+    sc : Scenario, path, name or Study
+        What holds where nothing varies; or a study, whose varied quantities are the inputs.
     inputs : mapping of str to distribution
-        Independent inputs: paths of numbers and how they are distributed, such as ``"attacker.position.x"`` or
-        ``"d1.visibility_radius"`` with anything that has a ``ppf``; or what a study varies, with its samplers
-        (``sensitivity(study.scenario, study.vary)``). A position that is drawn as a whole is one input.
+        Not with a study. Independent inputs: paths of numbers and how they are distributed, such as
+        ``"attacker.position.x"`` or ``"d1.visibility_radius"`` with anything that has a ``ppf``, or a sampler, as a
+        study takes them. A position that is drawn as a whole is one input.
     points : int
         n, a power of 2.
     seed : int
@@ -84,20 +85,26 @@ def sensitivity(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
-    sc = as_scenario(sc)
-    refuse_random(sc, "sensitivity", "Sobol' indices are of a function of the inputs alone")
+    if isinstance(sc, Study):
+        if inputs is not None:
+            raise ScenarioError("inputs", inputs, "left out: a study brings what it varies")
+        game, inputs = sc.scenario, sc.vary
+    else:
+        game = as_scenario(sc)
+    refuse_random(game, "sensitivity", "Sobol' indices are of a function of the inputs alone")
     if not isinstance(inputs, Mapping):
-        raise ScenarioError("inputs", inputs, "a mapping of names of numbers to distributions")
-    known = (*outcome_names(sc.n, diverged=True), NO_EQUILIBRIUM, "time")
+        given = MISSING if inputs is None else inputs
+        raise ScenarioError("inputs", given, "a mapping of names of numbers to distributions")
+    known = (*outcome_names(game.n, diverged=True), NO_EQUILIBRIUM, "time")
     if isinstance(outputs, str) or not isinstance(outputs, Iterable):
         raise ScenarioError("outputs", outputs, f"a sequence of names, each one of {', '.join(known)}")
     wanted = tuple(outputs)
     for output in wanted:
         one_of("outputs", output, known)
-    varied, drawn = _inputs(sc, inputs)
+    varied, drawn = _inputs(game, inputs)
 
     def play(x: Floats) -> Floats:
-        found = _events(sc, varied, np.ascontiguousarray(x.T), threads)
+        found = _events(game, varied, np.ascontiguousarray(x.T), threads)
         return found[[known.index(output) for output in wanted]]
 
     return sobol(play, drawn, wanted, points=points, seed=seed, level=level, resamples=resamples)

@@ -115,7 +115,9 @@ class Study(Definition):
     """
 
     def replace(self, **changes: Any) -> Study:
-        """Another study with some of the arguments changed."""
+        """Another study with some of the arguments changed; ``scenario``, as the attribute is called, is ``sc``."""
+        if "scenario" in changes and "sc" not in changes:
+            changes["sc"] = changes.pop("scenario")
         given: dict[str, Any] = {"vary": dict(self.vary), "trials": self.trials, "seed": self.seed}
         given |= {"design": self.design, "termination": self.termination, "passes": self.passes}
         given["keep"] = self.keep

@@ -140,6 +140,13 @@ def test_the_samplers_of_a_study_and_positions_as_a_whole():
         sc, {"attacker.position": Disk([0, 1], 2.0), "d1.visibility_radius": Box(50.0, 60.0)}, trials=1
     )
     found = sensitivity(study.scenario, study.vary, points=256, outputs=["intercepted", "time"], resamples=50)
+    same = sensitivity(study, points=256, outputs=["intercepted", "time"], resamples=50)
+    assert repr(same) == repr(found)
+    assert np.array_equal(same.total, found.total)
+    with pytest.raises(ScenarioError, match="left out: a study brings what it varies"):
+        sensitivity(study, study.vary)
+    with pytest.raises(ScenarioError, match="inputs: got nothing, must be a mapping of names"):
+        sensitivity(study.scenario)
     assert found.inputs == ("attacker.position", "defenders.0.visibility_radius")
     assert found.total[0, 1] == pytest.approx(0.0, abs=1e-12)
     assert found.first[0, 0] == pytest.approx(1.0, abs=0.1)

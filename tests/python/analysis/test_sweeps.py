@@ -30,6 +30,8 @@ def test_every_cell_is_the_study_of_its_scenario():
             assert float(at["probability"].sum()) == pytest.approx(1.0)
             ends = proportion_interval(at["count"].values, 400)
             assert np.array_equal((at["low"].values, at["high"].values), ends)
+            band = proportion_interval(at["count"].values, 400, level=1 - 0.05 / 6, method="exact")
+            assert np.array_equal((at["band_low"].values, at["band_high"].values), band)
             for kind, mean in enumerate(at["mean_time"].values):
                 times = alone.time[alone.kind == kind]
                 assert np.isnan(mean) if not len(times) else mean == pytest.approx(times.mean())
@@ -51,7 +53,7 @@ def test_a_cell_without_equilibrium_is_a_result():
     assert data["escape_time"].values[2:] == pytest.approx([ESCAPE] * 2, rel=1e-9)
     assert np.isnan(data["escape_time"].values[:2]).all()
     assert data["trials"].values.tolist() == [100, 100, 0, 0]
-    assert np.isnan([data[name].values[2:] for name in ("probability", "low", "high")]).all()
+    assert np.isnan([data[name].values[2:] for name in ("probability", "low", "high", "band_low")]).all()
     assert swept.cells[2].result is None
     lost = [int(cell.result.diverged.sum()) for cell in swept.cells if cell.result]
     assert repr(swept) == f"SweepResult(horizon (4); 2 without equilibrium; {sum(lost)} games diverged)"

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 
 import tadcore
 from tadcore import ScenarioError
@@ -49,6 +49,10 @@ def test_intervals_are_those_of_the_dataset(over_weights):
     [whiskers] = [drawn for drawn in ax.collections if isinstance(drawn, LineCollection)]
     ends = np.array([segment[:, 1] for segment in whiskers.get_segments() if len(segment)])
     assert np.array_equal(ends[-2:], np.stack([made["low"], made["high"]], axis=1)[1:])
+    pale, dark = (drawn.get_paths()[0].vertices[:, 1] for drawn in ax.collections if isinstance(drawn, PolyCollection))
+    for drawn, low, high in ((pale, "band_low", "band_high"), (dark, "low", "high")):
+        assert (drawn.min(), drawn.max()) == (made[low].min(), made[high].max())
+    assert pale.max() > dark.max()
     with pytest.raises(ValueError, match="no outcome 'won'; one of timeout, captured, intercepted, diverged"):
         over_weights.plot(outcomes=["won"])
 

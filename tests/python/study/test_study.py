@@ -438,3 +438,11 @@ def test_ctrl_c_ends_a_study_within_a_fifth_of_a_second():
         if took[-1] < 0.2:
             break
     assert min(took) < 0.2
+
+
+def test_replace_takes_the_scenario_by_either_name():
+    study = tadcore.Study(tadcore.scenarios.load("paper-i1"), {"d1.visibility_radius": [1.0, 2.0]}, trials=3)
+    other = tadcore.scenarios.load("paper-i1-full")
+    assert study.replace(scenario=other).scenario == study.replace(sc=other).scenario == other
+    with pytest.raises(TypeError, match="no option 'scenario'"):
+        study.replace(sc=other, scenario=other)

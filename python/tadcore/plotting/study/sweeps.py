@@ -35,7 +35,7 @@ class Swept(Protocol):
         """The swept paths and their values."""
 
     def to_xarray(self) -> xarray.Dataset:
-        """``probability``, ``low`` and ``high`` over the grid and ``outcome``, and ``status`` over the grid."""
+        """``probability``, its interval and band over the grid and ``outcome``, and ``status`` over the grid."""
 
 
 @public
@@ -44,9 +44,10 @@ def sweep(
 ) -> Axes:
     """Draw outcome probabilities over one or two swept quantities.
 
-    Over one, a line for each outcome with its 95 % intervals, each by itself; values that are no numbers stand side by
-    side. Over two, a heat map of one outcome, with the shares written into a small one. Cells without an equilibrium
-    are filled and hatched, and named above; cells of a heat map in which some games diverged carry a cross.
+    Over one, a line for each outcome with its 95 % intervals, each by itself, and a pale band that holds at all values
+    at once; values that are no numbers stand side by side. Over two, a heat map of one outcome, with the shares written
+    into a small one. Cells without an equilibrium are filled and hatched, and named above; cells of a heat map in which
+    some games diverged carry a cross.
 
     Parameters
     ----------
@@ -96,6 +97,8 @@ def _lines(found: Swept, made: xarray.Dataset, ax: Axes | None, outcomes: list[s
         it = outcome_look(name)
         line, low, high = (made[part].sel(outcome=name).values[order] for part in ("probability", "low", "high"))
         if numbers is not None:
+            least, most = (made[part].sel(outcome=name).values[order] for part in ("band_low", "band_high"))
+            ax.fill_between(at, least, most, color=it.colour, alpha=0.1, linewidth=0)
             ax.fill_between(at, low, high, color=it.colour, alpha=0.22, linewidth=0)
         ax.vlines(at, low, high, color=it.colour, linewidth=0.7, alpha=0.8)
         ax.plot(
