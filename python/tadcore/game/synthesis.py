@@ -80,8 +80,9 @@ class Gains:
     certified_blocks : bool
         Whether they are proved to be one among the paper's gains too, all blocks of dim × dim, those that turn
         included. In I2 wherever `certified`. False says nothing: blocks need not do better there.
-    start : {"canonical", "complex", "stacked", "reversed"}
-        Starting point of the descent that found it: the canonical one, or a further one of the search.
+    start : {"canonical", "complex", "stacked", "reversed", "between"}
+        Starting point of the descent that found it: the canonical one, a further one of the search, or the point between
+        the minima at two instants around.
     restarts_left_out : int
         Further starting points that promised to lead lower but were not tried: with more than seven defenders at most
         twenty-four are tried in each of up to four rounds. 0 elsewhere.
@@ -99,7 +100,7 @@ class Gains:
     gradient_norm: float
     certified: bool
     certified_blocks: bool
-    start: Literal["canonical", "complex", "stacked", "reversed"]
+    start: Literal["canonical", "complex", "stacked", "reversed", "between"]
     restarts_left_out: int = 0
 
     def __repr__(self) -> str:
@@ -113,7 +114,7 @@ def synthesize(
     *,
     step: int,
     adjacency: ArrayLike | VisibilityNetwork,
-    method: Literal["newton", "descent"] = "newton",
+    method: Literal["newton", "restarts", "descent"] = "newton",
     max_iterations: int | None = None,
 ) -> Gains:
     """The gains at instant t_k under a given network.
@@ -128,11 +129,13 @@ def synthesize(
         k of the instant t_k, 0 … K.
     adjacency : array_like, shape (m, N), or VisibilityNetwork
         𝒜: row i whom player i sees, entry j ≠ i the player j, entry i the attacker; 0-1 or bool.
-    method : {"newton", "descent"}
-        ``"newton"``: the exact Hessian from the canonical start, with a second start in complex gains.
+    method : {"newton", "restarts", "descent"}
+        ``"newton"``: the gains of runs, by Newton's method with the exact Hessian. At some instants of the grid, its
+        anchors, from the canonical start with restarts; between two of them from between the minima there, if these
+        are near each other. ``"restarts"``: with restarts at this instant, whatever lies around it.
         ``"descent"``: gradient descent with the gradients printed in the paper (eq:errgradient).
     max_iterations : int, optional
-        Stop after this many steps; the result then says that it has not converged.
+        Stop after this many steps, at this instant alone; the result then says that it has not converged.
 
     Returns
     -------
@@ -158,8 +161,8 @@ def synthesize(
     shape = (len(sc.constrained), sc.n + 1)
     seen = as_adjacency(adjacency, shape)
     k = as_index("step", step, sc.steps)
-    if not isinstance(method, str) or method not in ("newton", "descent"):
-        raise ScenarioError("method", method, '"newton" or "descent"')
+    if not isinstance(method, str) or method not in ("newton", "restarts", "descent"):
+        raise ScenarioError("method", method, '"newton", "restarts" or "descent"')
     limit = None if max_iterations is None else as_index("max_iterations", max_iterations, 2**31 - 1, least=1)
     core = game_of(sc).synthesize(k, seen, method=method, max_iterations=limit)
     names = theta_terms(sc.interaction)

@@ -92,7 +92,7 @@ impl Gains {
         self.gains.left_out
     }
 
-    /// The start that led to the minimum: canonical, complex, stacked or reversed.
+    /// The start that led to the minimum: canonical, complex, stacked, reversed or between.
     #[getter]
     fn start(&self) -> &'static str {
         match self.gains.start {
@@ -100,6 +100,7 @@ impl Gains {
             Start::Complex => "complex",
             Start::Stacked => "stacked",
             Start::Reversed => "reversed",
+            Start::Between => "between",
         }
     }
 }

@@ -171,22 +171,23 @@ impl Game {
                     self.game.grid().steps()
                 )));
             }
-            let mut options = Options::new(match method {
-                "newton" => Method::Newton,
-                "descent" => Method::Descent,
+            let mut options = match method {
+                "newton" => max_iterations.map(|_| Options::default()),
+                "restarts" => Some(Options::default()),
+                "descent" => Some(Options::new(Method::Descent)),
                 other => {
-                    return Err(PyValueError::new_err(format!("method is {other:?}; it must be newton or descent")));
+                    let rule = "it must be newton, restarts or descent";
+                    return Err(PyValueError::new_err(format!("method is {other:?}; {rule}")));
                 }
-            });
-            if let Some(limit) = max_iterations {
+            };
+            if let (Some(options), Some(limit)) = (&mut options, max_iterations) {
                 options.max_iterations = limit;
             }
             let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
             let policy = self.policy(py)?;
             let (gains, terms, blocks) = detach::interruptible(py, |cancel| {
                 let (mut solver, problem) = (Synthesizer::new(), policy.problem(step, cancel)?);
-                solver.watch(cancel);
-                let gains = policy.gains(&problem, &topology, options, &mut solver)?;
+                let gains = policy.gains(step, &topology, options, &mut solver, cancel)?;
                 let terms = problem.terms(policy.equilibrium().node(step), &gains.rows, cancel)?;
                 let blocks = gains.certified_blocks(&problem, &topology, cancel)?;
                 Ok((gains, terms, blocks))

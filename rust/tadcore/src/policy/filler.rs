@@ -9,7 +9,7 @@ use crate::cancel::CancelToken;
 use crate::error::{NoMemory, Stopped};
 use crate::memory::{grow, spare};
 use crate::network::Topology;
-use crate::synthesis::{Options, Problem, SIDE_BY_SIDE_UP_TO, Synthesizer};
+use crate::synthesis::{Problem, SIDE_BY_SIDE_UP_TO, Synthesizer};
 
 /// Entries that a thread claims and solves at once, side by side: enough to keep eight lanes full, and few enough for
 /// other threads to have their share and for a cancellation to be noticed soon.
@@ -130,7 +130,7 @@ impl Filler {
         let Self { solver, closed_loop, square, row, padded } = self;
         let (closed_loop, square) = (&mut closed_loop[..n * n], &mut square[..n * n]);
         let canonical_forms: Vec<Topology> = unknown.iter().map(|wanted| wanted.canonical.clone()).collect();
-        solver.solve_all(&instant.problem, &canonical_forms, Options::default(), |index, gains| {
+        policy.solve_forms(instant.step, &instant.problem, &canonical_forms, solver, cancel, |index, gains| {
             closed_loop::matrix(&instant.free, &gains.rows, closed_loop);
             policy.transitions.note_rate(instant.step, closed_loop::norm(closed_loop, n));
             let step = policy.game.grid().step();

@@ -11,6 +11,7 @@
 //! A [`Policy`] owns the game, its equilibrium and the table of everything computed so far; it is shared, by reference,
 //! between all runs of the game, whatever their positions and radii.
 
+mod anchors;
 mod budget;
 pub mod closed_loop;
 pub mod exponential;
@@ -33,6 +34,7 @@ use crate::memory::{spare, zeros};
 use crate::network::Topology;
 use crate::riccati::{self, Equilibrium};
 use crate::synthesis::{Gains, Options, Problem, Synthesizer};
+use anchors::Anchors;
 use budget::Budget;
 use symmetry::SymmetryClasses;
 use table::Table;
@@ -65,6 +67,7 @@ pub struct Policy {
     equilibrium: Arc<Equilibrium>,
     classes: SymmetryClasses,
     budget: Budget,
+    anchors: Anchors,
     table: Table,
     transitions: Transitions,
 }
@@ -91,7 +94,7 @@ impl Policy {
     /// the tables can be used, or one of its parent's threads holds what nobody will ever give back.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.table.is_idle() && self.transitions.is_idle()
+        self.anchors.is_idle() && self.table.is_idle() && self.transitions.is_idle()
     }
 
     fn with(
@@ -105,8 +108,8 @@ impl Policy {
         let instants = if equilibrium.is_constant() { 1 } else { steps + 1 };
         let (table, budget) = (Table::new(instants, cancel)?, Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size(), cancel)?;
-        let classes = SymmetryClasses::of(&game);
-        Ok(Self { game, equilibrium, classes, budget, table, transitions })
+        let (classes, anchors) = (SymmetryClasses::of(&game), Anchors::of(&equilibrium, cancel)?);
+        Ok(Self { game, equilibrium, classes, budget, anchors, table, transitions })
     }
 
     /// The game.
@@ -199,20 +202,44 @@ impl Policy {
         Ok(entry)
     }
 
-    /// The gains of `problem`, one of this policy's, under a topology by any method, without looking at the table.
+    /// The gains at (step, topology), without looking at the table: those of runs, or with `options` by any method at this
+    /// instant alone.
     ///
     /// # Errors
-    /// [`Stopped`] when there is no memory for them, or the token that `solver` watches was raised.
+    /// [`Stopped`] when there is no memory for them, or `cancel` was raised.
     pub fn gains(
         &self,
-        problem: &Problem,
+        step: usize,
         topology: &Topology,
-        options: Options,
+        options: Option<Options>,
         solver: &mut Synthesizer,
+        cancel: &CancelToken,
     ) -> Result<Gains, Stopped> {
         let (canonical, order) = self.classes.canonical(topology);
-        let gains = solver.solve(problem, &canonical, options)?;
+        solver.watch(cancel);
+        let problem = self.problem(step, cancel)?;
+        let gains = match options {
+            Some(options) => solver.solve(&problem, &canonical, options)?,
+            None => self.solve_form(step, &problem, &canonical, solver, cancel)?,
+        };
         Ok(Gains { rows: symmetry::back(&order, &gains.rows)?, ..gains })
+    }
+
+    /// The gains of one canonical form at t_k.
+    fn solve_form(
+        &self,
+        step: usize,
+        problem: &Problem,
+        form: &Topology,
+        solver: &mut Synthesizer,
+        cancel: &CancelToken,
+    ) -> Result<Gains, Stopped> {
+        let mut found = None;
+        self.solve_forms(step, problem, std::slice::from_ref(form), solver, cancel, |_, gains| {
+            found = Some(gains.clone());
+            Ok(())
+        })?;
+        Ok(found.unwrap_or_else(|| unreachable!("one network, one answer")))
     }
 
     /// Solves (step, topology) without looking at the table.
@@ -231,7 +258,7 @@ impl Policy {
         let n = self.game.size();
         solver.watch(cancel);
         let problem = self.problem(step, cancel)?;
-        let gains = solver.solve(&problem, &canonical, Options::default())?;
+        let gains = self.solve_form(step, &problem, &canonical, solver, cancel)?;
         let free = self.free_rows(step);
         let mut c = zeros(exponential::WHAT, n * n)?;
         closed_loop::matrix(&free, &gains.rows, &mut c);

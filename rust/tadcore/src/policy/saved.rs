@@ -13,7 +13,7 @@ use crate::game::{Criterion, Game, Interaction};
 use crate::memory::{reserve, zeros};
 
 const MAGIC: &[u8; 8] = b"tadtable";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Bytes, in whole entries, that are checked between two looks at the cancel token.
 const POLL: usize = 1 << 22;
 const HEADER: usize = 8 + 4 * 4 + 2 * 8;

@@ -35,6 +35,7 @@ pub(crate) use search::SIDE_BY_SIDE_UP_TO;
 pub use search::Start;
 pub(crate) use tadcore_kernels::synthesis::newton;
 pub use theta::Problem;
+pub(crate) use theta::TABULATED_UP_TO;
 
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
@@ -104,6 +105,8 @@ pub struct Gains {
     pub start: Start,
     /// Restarts that promised to lead lower, beyond those made: in large games their number is limited.
     pub left_out: usize,
+    /// Whether a descent met a narrow valley, whose floor was followed to its end.
+    pub narrow: bool,
 }
 
 impl Gains {
@@ -183,25 +186,8 @@ impl Synthesizer {
         options: Options,
         mut each: impl FnMut(usize, Gains) -> Result<(), Stopped>,
     ) -> Result<(), Stopped> {
-        let limits = Limits {
-            iterations: options.max_iterations,
-            tolerance: TOLERANCE.0,
-            acceptable: TOLERANCE.1,
-            longest: f64::INFINITY,
-        };
-        let mut candidates = Vec::with_capacity(topologies.len());
-        for topology in topologies {
-            let mut start = zeros("the gains of one network", problem.rows * problem.size)?;
-            search::canonical(problem, topology, &mut start);
-            let candidate = Candidate::new(
-                search::variables(topology, problem.criterion)?,
-                start,
-                problem.size,
-                topology.is_complete(),
-            )?;
-            search::admit(&candidate)?;
-            candidates.push(candidate);
-        }
+        let limits = limits(options);
+        let mut candidates = candidates(problem, topologies)?;
         let Self { dispatcher, tasks, doubled, workspace } = self;
         let mut search = Search { problem, limits, dispatcher, tasks, doubled, workspace };
         match options.method {
@@ -219,21 +205,70 @@ impl Synthesizer {
             }
         }
         for (index, candidate) in candidates.into_iter().enumerate() {
-            each(
-                index,
-                Gains {
-                    rows: candidate.g,
-                    theta: problem.in_scale_of_gamma(candidate.reached.value),
-                    gradient_norm: candidate.reached.gradient_norm,
-                    iterations: candidate.iterations,
-                    status: candidate.reached.status,
-                    certified: candidate.certified && candidate.reached.status == Status::Converged,
-                    start: candidate.start,
-                    left_out: candidate.left_out,
-                },
-            )?;
+            each(index, gains(problem, candidate))?;
         }
         Ok(())
+    }
+
+    /// The gains for each of `topologies` that Newton's method reaches from `starts`, handed to `each` with the
+    /// topology's index; none where it does not soon reach a minimum near there, which then has to be searched for.
+    ///
+    /// # Errors
+    /// As for [`Self::solve`], and what `each` says.
+    pub(crate) fn follow_all(
+        &mut self,
+        problem: &Problem,
+        topologies: &[Topology],
+        starts: &[Vec<f64>],
+        mut each: impl FnMut(usize, Option<Gains>) -> Result<(), Stopped>,
+    ) -> Result<(), Stopped> {
+        let limits = limits(Options::default());
+        let mut candidates = candidates(problem, topologies)?;
+        let Self { dispatcher, tasks, doubled, workspace } = self;
+        let mut search = Search { problem, limits, dispatcher, tasks, doubled, workspace };
+        let reached = search.continue_from(&mut candidates, starts)?;
+        for (index, (candidate, reached)) in candidates.into_iter().zip(reached).enumerate() {
+            each(index, reached.then(|| gains(problem, candidate)))?;
+        }
+        Ok(())
+    }
+}
+
+fn limits(options: Options) -> Limits {
+    Limits {
+        iterations: options.max_iterations,
+        tolerance: TOLERANCE.0,
+        acceptable: TOLERANCE.1,
+        longest: f64::INFINITY,
+    }
+}
+
+/// The networks of one instant, each at its canonical start.
+fn candidates(problem: &Problem, topologies: &[Topology]) -> Result<Vec<Candidate>, Stopped> {
+    let mut candidates = Vec::with_capacity(topologies.len());
+    for topology in topologies {
+        let mut start = zeros("the gains of one network", problem.rows * problem.size)?;
+        search::canonical(problem, topology, &mut start);
+        let variables = search::variables(topology, problem.criterion)?;
+        let candidate = Candidate::new(variables, start, problem.size, topology.is_complete())?;
+        search::admit(&candidate)?;
+        candidates.push(candidate);
+    }
+    Ok(candidates)
+}
+
+/// What was found for a network.
+fn gains(problem: &Problem, candidate: Candidate) -> Gains {
+    Gains {
+        theta: problem.in_scale_of_gamma(candidate.reached.value),
+        gradient_norm: candidate.reached.gradient_norm,
+        iterations: candidate.iterations,
+        status: candidate.reached.status,
+        certified: candidate.certified && candidate.reached.status == Status::Converged,
+        start: candidate.start,
+        left_out: candidate.left_out,
+        narrow: !candidate.quick && !candidate.complete,
+        rows: candidate.g,
     }
 }
 

@@ -16,6 +16,8 @@ pub enum Start {
     Stacked,
     /// The best gains with rows reversed, or the canonical start with a row left out.
     Reversed,
+    /// Between the minima at two instants around.
+    Between,
 }
 
 /// Distance, relative to the best gains, at which a descent is taken to be back at them; a second part B that is as

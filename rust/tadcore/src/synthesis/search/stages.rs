@@ -6,7 +6,7 @@ use super::moves::Moves;
 use crate::error::{NoMemory, Stopped};
 use crate::memory;
 use crate::simd::norm;
-use crate::synthesis::newton::{Limits, Owner, Tasks, Workspace, advance};
+use crate::synthesis::newton::{Limits, Owner, Status, Tasks, Workspace, advance};
 use crate::synthesis::theta::Problem;
 
 /// Size of the second part B at the start, relative to ‖F‖.
@@ -22,6 +22,9 @@ const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
 /// Rounds of moves, each from the best point of the one before.
 pub(super) const ROUNDS: usize = 4;
+/// Steps that Newton's method may take from between two minima, and how far, relative to the gains, it may lead.
+const CONTINUED: usize = 8;
+const MOVED: f64 = 0.05;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
 
@@ -129,6 +132,40 @@ impl Search<'_> {
         // Where a restart won there is another point to be tried for the certificate.
         let won: Vec<usize> = open.iter().copied().filter(|&e| candidates[e].start != Start::Canonical).collect();
         self.certify(candidates, &won)
+    }
+
+    /// Newton's method from a point for each candidate, where a minimum of another instant was; whether it soon led to a
+    /// minimum near there.
+    pub(crate) fn continue_from(
+        &mut self,
+        candidates: &mut [Candidate],
+        starts: &[Vec<f64>],
+    ) -> Result<Vec<bool>, Stopped> {
+        self.begin(1);
+        for (e, (candidate, start)) in candidates.iter_mut().zip(starts).enumerate() {
+            candidate.g.copy_from_slice(start);
+            let point = self.tasks.add(e, false, 0.0)?;
+            point.copy_from_slice(start);
+            candidate.in_double(point);
+        }
+        let limits = self.limits;
+        self.limits.iterations = CONTINUED;
+        self.descend(Kind::Certified, candidates)?;
+        self.limits = limits;
+        let mut near = Vec::with_capacity(candidates.len());
+        for (e, candidate) in candidates.iter_mut().enumerate() {
+            let (point, reached) = (self.tasks.point(e), self.tasks.reached(e));
+            let moved: f64 = point.iter().zip(&candidate.g).map(|(x, y)| (x - y) * (x - y)).sum();
+            near.push(reached.status == Status::Converged && moved.sqrt() <= MOVED * norm(&candidate.g));
+            candidate.take(Start::Between, point, reached);
+            candidate.iterations = reached.iterations;
+            candidate.certified = self.tasks.certified(e);
+            candidate.quick = true;
+        }
+        self.refine(candidates)?;
+        let still = |candidate: &Candidate| candidate.reached.status == Status::Converged;
+        near.iter_mut().zip(candidates.iter()).for_each(|(near, candidate)| *near &= still(candidate));
+        Ok(near)
     }
 
     /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as

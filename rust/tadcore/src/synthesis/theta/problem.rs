@@ -233,6 +233,11 @@ impl Problem {
         self.size > TABULATED_UP_TO
     }
 
+    /// Whether minima are followed from one instant to another: not in large games, nor where S has next to no weight.
+    pub(crate) fn is_followed(&self) -> bool {
+        !self.is_large() && self.faint().is_empty()
+    }
+
     /// N.
     #[must_use]
     pub fn size(&self) -> usize {
