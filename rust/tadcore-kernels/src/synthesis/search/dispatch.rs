@@ -128,7 +128,8 @@ impl Dispatcher {
         let backend = Backend { library, width, cancel: Some(cancel) };
         let mut list = List { kind, tasks, owners, limits, backend };
         let several = list.tasks.len() >= SIDE_BY_SIDE_FROM;
-        let single = problem.single.as_ref().filter(|_| side_by_side(N));
+        let wanted = matches!(kind, Kind::Screening | Kind::Doubled) && side_by_side(N);
+        let single = if wanted { problem.single() } else { None };
         match (kind, single) {
             (Kind::Screening | Kind::Doubled, Some(coefficients)) => {
                 if const { side_by_side(N) } && several {
@@ -160,7 +161,7 @@ const fn side_by_side(n: usize) -> bool {
 /// Whether descents are made in single precision: where they go side by side, twice as many fit a register.
 #[must_use]
 pub fn single(problem: &Precisions) -> bool {
-    problem.single.is_some() && side_by_side(problem.double.size)
+    side_by_side(problem.double.size) && problem.single().is_some()
 }
 
 // All widths agree bitwise: where loops are slow anyway, one version for all sizes will do.

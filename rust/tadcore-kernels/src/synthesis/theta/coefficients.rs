@@ -1,5 +1,7 @@
 //! What Θ is made of, in the precision of a kernel.
 
+use std::sync::OnceLock;
+
 use crate::simd::Scalar;
 
 /// N up to which the constant part of the Hessian is a matrix in memory; beyond, where its (mN)² numbers would be most of
@@ -55,14 +57,28 @@ pub struct Scale {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Precisions {
     pub double: Coefficients<f64>,
-    /// In single precision, where that can hold it.
-    pub single: Option<Coefficients<f32>>,
+    /// In single precision, made when it is first asked for: who follows a minimum does not need it.
+    single: OnceLock<Option<Coefficients<f32>>>,
 }
 
 impl From<Coefficients<f64>> for Precisions {
     fn from(double: Coefficients<f64>) -> Self {
-        let single = (double.size <= TABULATED_UP_TO && double.in_range()).then(|| double.rounded());
-        Self { double, single }
+        Self { double, single: OnceLock::new() }
+    }
+}
+
+impl Precisions {
+    /// A problem that is to be looked at in double precision alone.
+    #[must_use]
+    pub fn double_only(double: Coefficients<f64>) -> Self {
+        Self { double, single: None.into() }
+    }
+
+    /// In single precision, where that can hold it.
+    pub fn single(&self) -> Option<&Coefficients<f32>> {
+        let double = &self.double;
+        let make = || (double.size <= TABULATED_UP_TO && double.in_range()).then(|| double.rounded());
+        self.single.get_or_init(make).as_ref()
     }
 }
 

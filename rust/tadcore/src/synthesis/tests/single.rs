@@ -15,7 +15,7 @@ fn screen(
     incumbent: Incumbent,
     iterations: usize,
 ) -> (bool, usize) {
-    let coefficients = problem.theta.single.as_ref().expect("a problem in range");
+    let coefficients = problem.theta.single().expect("a problem in range");
     let mut tasks = Tasks::default();
     tasks.clear(start.len(), 1);
     tasks.add(0, false, 0.0).expect("memory").copy_from_slice(start);
@@ -75,7 +75,7 @@ fn only_what_cannot_win_is_pruned() {
 fn out_of_range_everything_is_done_in_double() {
     for interaction in [Interaction::I1, Interaction::I2] {
         let (problem, p, _) = sample(interaction);
-        assert!(problem.theta.single.is_some());
+        assert!(problem.theta.single().is_some());
         let (m, n) = (problem.rows(), problem.size());
         let topologies: Vec<Topology> = (0..1u64 << (m * n))
             .step_by(if m * n > 9 { 29 } else { 3 })
@@ -97,7 +97,7 @@ fn out_of_range_everything_is_done_in_double() {
             let p: Vec<f64> = p.iter().map(|p| p * scale).collect();
             let scaled =
                 Problem::from_parts(interaction, r, problem.gamma.clone(), &p, &CancelToken::new()).expect("memory");
-            assert!(scaled.theta.single.is_none());
+            assert!(scaled.theta.single().is_none());
             for ((gains, expected), topology) in solve(&scaled).iter().zip(&within).zip(&topologies) {
                 let theta = gains.theta / (scale * scale);
                 assert!((theta - expected.theta).abs() <= 1e-12 * (1.0 + expected.theta), "{topology:?}");

@@ -185,10 +185,7 @@ impl Problem {
     pub(crate) fn weighted(&self, players: &[usize], weight: f64) -> Precisions {
         let all = self.feedback(players.iter().copied());
         let common = if all > 0.0 { weight * self.theta.double.scale.value / all } else { 0.0 };
-        Precisions {
-            double: self.reweighted(players, |i, own| own + common * self.theta.double.r[i].powi(2)),
-            single: None,
-        }
+        Precisions::double_only(self.reweighted(players, |i, own| own + common * self.theta.double.r[i].powi(2)))
     }
 
     /// Θ without weight on ‖S_i‖² of those players.
