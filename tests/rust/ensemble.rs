@@ -270,7 +270,7 @@ fn a_saved_table_comes_back_whole_and_a_damaged_one_is_refused() {
         assert_eq!(load(&bytes[..bytes.len() - 8]), Err(TableError::Damaged));
         let mut former = bytes.clone();
         former[8] = 1;
-        assert_eq!(load(&former), Err(TableError::Format { found: 1, expected: 2 }));
+        assert_eq!(load(&former), Err(TableError::Format { found: 1, expected: 3 }));
     }
 }
 
