@@ -3,10 +3,10 @@
 States are eight contiguous rows, one for each coordinate of z, so that the loop over trials that looks at distances has
 no branch and no call in it and is vectorised. Trials that end are replaced by the last one: the rest stay contiguous.
 A block of trials is as large as the second-level cache; the table is one flat array, 16 numbers an entry, indexed by
-(step, topology). Nothing is allocated inside the loops. Missing entries are solved by `_lockstep._solve`.
+(step, topology). Nothing is allocated inside the loops. Missing entries are solved by `_strong.entry`.
 """
 
-import _lockstep
+import _strong
 import numpy as np
 from numba import njit
 
@@ -79,7 +79,7 @@ def lockstep3(starts, sight, capture, P, r, r_tau, r_a, step, gamma, index, tabl
     z = np.empty((8, BLOCK))
     ids, keys, entries = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int32), np.empty(BLOCK, np.int32)
     over = np.empty(BLOCK, np.bool_)
-    flat = table.reshape(-1)
+    flat, work = table.reshape(-1), _strong.scratch()
     reach = capture[0], capture[1], capture[2], capture[3]
     for first in range(0, trials, BLOCK):
         count = min(BLOCK, trials - first)
@@ -105,7 +105,7 @@ def lockstep3(starts, sight, capture, P, r, r_tau, r_a, step, gamma, index, tabl
             for a in range(count):
                 entry = here[keys[a]]
                 if entry < 0:
-                    table[filled] = _lockstep._solve(keys[a], P[k], r, r_tau, r_a, step, gamma)
+                    _strong.entry(keys[a], P[k], r, r_tau, r_a, step, gamma, flat[16 * filled : 16 * filled + 16], work)
                     entry = here[keys[a]] = filled
                     filled += 1
                 entries[a] = entry

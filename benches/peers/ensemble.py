@@ -2,7 +2,7 @@
 
 n = 3, T = 6, δ = 0.005, ζ = (5, 2.25, 1.25), σ = 0.1; every coordinate of every player is uniform in [−3, 3]. Numba
 has the (step, topology) table too, filled by Newton from the canonical start where an entry is missing (one descent:
-it does not look for lower minima, tadcore does). `cold` starts with an empty table, Riccati not counted; `warm` plays
+it does not look for lower minima, tadcore does); the lockstep fills it by `_strong`, written out for the compiler. `cold` starts with an empty table, Riccati not counted; `warm` plays
 the same trials from the table that a first round filled. JAX is warm only, from the table that Numba filled, in batches
 of 4,000. SciPy is the paper's own way, BFGS at every instant (`run.py`): a few trials, whose mean time stands for all.
 
@@ -111,7 +111,7 @@ def papers_way(trials: int, best: float) -> tuple[str, ...]:
     began = time.process_time()
     theirs = [run.scipy_run(start)[0] for start in positions]
     each = (time.process_time() - began) / trials
-    kind, defender, when = tadcore_play(core, positions)
+    kind, defender, when, *_ = tadcore_play(core, positions)
     named = [("timeout", "captured", f"d{d + 1} intercepts")[k] for k, d in zip(kind, defender, strict=True)]
     apart = [a != (b[0], b[1]) for a, b in zip(zip(named, when, strict=True), theirs, strict=True)]
     _side.agree(f"SciPy, share of {trials} trials that differ", float(np.mean(apart)), 0.0)

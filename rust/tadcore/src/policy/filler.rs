@@ -29,6 +29,7 @@ struct Wanted<'a> {
     topology: &'a Topology,
     canonical: Topology,
     order: Vec<usize>,
+    edges: usize,
 }
 
 /// What a thread needs to solve entries: its solver and scratch memory.
@@ -61,7 +62,8 @@ impl Filler {
             .iter()
             .map(|topology| {
                 let (canonical, order) = policy.classes.canonical(topology);
-                Wanted { topology, canonical, order }
+                let edges = canonical.edges();
+                Wanted { topology, canonical, order, edges }
             })
             .collect();
         let mut unknown: Vec<&Wanted> = Vec::new();
@@ -71,7 +73,7 @@ impl Filler {
             }
         }
         // Those with many unknowns first: the quick ones fill the lanes to the end.
-        unknown.sort_by(|a, b| (b.canonical.edges(), &b.canonical).cmp(&(a.canonical.edges(), &a.canonical)));
+        unknown.sort_unstable_by(|a, b| (b.edges, &b.canonical).cmp(&(a.edges, &a.canonical)));
         unknown.dedup_by(|a, b| a.canonical == b.canonical);
         let group = if policy.game.size() <= SIDE_BY_SIDE_UP_TO { GROUP } else { 1 };
         let group = unknown.len().div_ceil(unknown.len().div_ceil(group).max(1)).max(1);
