@@ -67,10 +67,8 @@ def main(pairs: int, seed: int) -> None:
             counts["  steps of the search"] += alone.iterations if between else 0
             if between and apart > LOWER:
                 worst = max(worst, apart)
-                print(
-                    f"  higher by {apart:.1e}: seed {seed}, game {game - 1}, k = {k} of {run.scenario.steps}, {seen[k].astype(int).tolist()}",
-                    flush=True,
-                )
+                where = f"seed {seed}, game {game - 1}, k = {k} of {run.scenario.steps}"
+                print(f"  higher by {apart:.1e}: {where}, {seen[k].astype(int).tolist()}", flush=True)
     print(f"{game} games")
     for name, count in counts.items():
         print(f"{name:<32} {count:>9,}")

@@ -13,7 +13,7 @@ N, ROWS, ALL = 4, 3, 12
 
 @njit(cache=True)
 def scratch():
-    """Everything that `entry` writes to: F, G, W, E, X, Δ; Hessian on all gains, on the unknowns, its factor; and so on."""
+    """Everything that `entry` writes to: F, G, W, E, X, Δ, the Hessian twice, its factor, vectors, matrices."""
     rows, square = (ROWS, N), (N, N)
     vectors = np.zeros(ALL), np.zeros(ALL), np.zeros(rows), np.zeros((ROWS, ROWS))
     matrices = np.zeros((ALL, ALL)), np.zeros((ALL, ALL)), np.zeros((ALL, ALL))

@@ -2,7 +2,8 @@
 
 n = 3, T = 6, δ = 0.005, ζ = (5, 2.25, 1.25), σ = 0.1; every coordinate of every player is uniform in [−3, 3]. Numba
 has the (step, topology) table too, filled by Newton from the canonical start where an entry is missing (one descent:
-it does not look for lower minima, tadcore does); the lockstep fills it by `_strong`, written out for the compiler. `cold` starts with an empty table, Riccati not counted; `warm` plays
+it does not look for lower minima, tadcore does); the lockstep fills it by `_strong`, written out for the compiler.
+`cold` starts with an empty table, Riccati not counted; `warm` plays
 the same trials from the table that a first round filled. JAX is warm only, from the table that Numba filled, in batches
 of 4,000. SciPy is the paper's own way, BFGS at every instant (`run.py`): a few trials, whose mean time stands for all.
 

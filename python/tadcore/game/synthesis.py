@@ -81,8 +81,8 @@ class Gains:
         Whether they are proved to be one among the paper's gains too, all blocks of dim × dim, those that turn
         included. In I2 wherever `certified`. False says nothing: blocks need not do better there.
     start : {"canonical", "complex", "stacked", "reversed", "between"}
-        Starting point of the descent that found it: the canonical one, a further one of the search, or the point between
-        the minima at two instants around.
+        Starting point of the descent that found it: the canonical one, a further one of the search, or the point
+        between the minima at two instants around.
     restarts_left_out : int
         Further starting points that promised to lead lower but were not tried: with more than seven defenders at most
         twenty-four are tried in each of up to four rounds. 0 elsewhere.
