@@ -16,7 +16,7 @@ def networks(sc, count, seed=0):
 
 
 @pytest.mark.parametrize("name", ["paper-i1", "paper-i2"])
-@pytest.mark.parametrize("method", ["newton", "descent"])
+@pytest.mark.parametrize("method", ["newton", "restarts", "descent"])
 @pytest.mark.parametrize("exponent", [1, -1, -9, -60, -600, -1000])
 def test_a_power_of_two_in_gamma_changes_theta_alone(name, method, exponent):
     sc = tadcore.scenarios.load(name)
