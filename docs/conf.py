@@ -42,7 +42,9 @@ autodoc_typehints = "none"  # the numpydoc sections say the types, with shapes
 numpydoc_show_class_members = False
 add_module_names = False
 
-html_sidebars = {page: [] for page in ("install", "errors", "glossary", "reliability")}  # nothing below them to list
+html_sidebars = {
+    page: [] for page in ("install", "tutorial", "errors", "glossary", "reliability")
+}  # no pages below them
 html_theme = "pydata_sphinx_theme"
 html_title = f"tadcore {release}"
 html_static_path = ["_static"]

@@ -156,7 +156,7 @@ class SweepResult:
                 " ".join(estimate(*(float(part[i, k]) for part in parts), least=3)) for k in range(len(names))
             ]  # fmt: skip
             note = f"no equilibrium: escapes {cell.escape_time:.4g} before T" if cell.result is None else ""
-            rows.append([*(f"{value}" for value in cell.values.values()), *found, note])
+            rows.append([*map(_word, cell.values.values()), *found, note])
         head = [*map(short, self.grid), *(f"P({name})" for name in names), ""]
         return as_html(repr(self), head, thinned(rows), line(f"{percent(_LEVEL)} intervals, each by itself"))
 
@@ -205,3 +205,8 @@ def _labels(values: Sequence[Any]) -> list[Any]:
     """The values as coordinates: numbers as they are, anything else as words."""
     plain = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
     return list(values) if plain else [str(v) for v in values]
+
+
+def _word(value: Any) -> str:
+    """A swept value for people: numbers without the noise of their last bits."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -138,3 +138,9 @@ def test_games_of_their_own_are_swept_too():
     lost = int((base.inputs()["horizon"] > ESCAPE).sum())
     assert data["count"].sel(outcome="no_equilibrium").values.tolist() == [lost, lost]
     assert data["count"].sum("outcome").values.tolist() == [40, 40]
+
+
+def test_values_are_shown_without_the_noise_of_their_last_bits():
+    shown = sweep(study(20), {"attacker.control_weight": [0.1 + 0.2, 1.0]})._repr_html_()
+    assert "0.3" in shown
+    assert "0.30000000000000004" not in shown
