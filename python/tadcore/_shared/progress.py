@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -16,3 +16,17 @@ def bar(items: Iterable[Item], what: str, *, show: bool, total: int | None = Non
 
     progress: Iterable[Item] = tqdm(items, desc=what, total=total, disable=None)  # None: quiet in a pipe
     return progress
+
+
+def pieces(rows: int, size: int, what: str, *, show: bool) -> Iterator[slice]:
+    """Consecutive rows: all at once, or so many at a time with a progress bar over the rows."""
+    if not show or rows <= size:
+        yield slice(0, rows)
+        return
+    from tqdm.auto import tqdm
+
+    with tqdm(desc=what, total=rows, unit="", unit_scale=True, disable=None) as progress:
+        for first in range(0, rows, size):
+            last = min(first + size, rows)
+            yield slice(first, last)
+            progress.update(last - first)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from tadcore._core import simulate_games
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_flag
 from tadcore._shared.calls import public
+from tadcore._shared.progress import pieces
 from tadcore._shared.text import one_of
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.game.outcome import NO_EQUILIBRIUM, UNPLAYED
@@ -28,6 +29,7 @@ from tadcore.study.vary import quantities
 
 from .replays import refuse_random
 
+_PIECE = 2**9  # games of their own between two words of progress
 _LOWEST, _HIGHEST = 2.0**-54, 1.0 - 2.0**-53  # samplers take points of the open unit cube
 
 
@@ -42,6 +44,7 @@ def sensitivity(
     level: float = 0.95,
     resamples: int = 500,
     threads: int | None = None,
+    progress: bool = False,
 ) -> Sensitivity:
     """Play games at n (d + 2) points and say which inputs decide their outcomes.
 
@@ -71,6 +74,8 @@ def sensitivity(
         [0, 1].
     threads : int, optional
         Worker threads; all cores by default.
+    progress : bool
+        Whether to show a bar over the games, where a terminal or a notebook watches.
 
     Returns
     -------
@@ -102,9 +107,10 @@ def sensitivity(
     for output in wanted:
         one_of("outputs", output, known)
     varied, drawn = _inputs(game, inputs)
+    show = as_flag("progress", progress)
 
     def play(x: Floats) -> Floats:
-        found = _events(game, varied, np.ascontiguousarray(x.T), threads)
+        found = _events(game, varied, np.ascontiguousarray(x.T), threads, show=show)
         return found[[known.index(output) for output in wanted]]
 
     return sobol(play, drawn, wanted, points=points, seed=seed, level=level, resamples=resamples)
@@ -140,16 +146,25 @@ def _joint(sampler: Sampler, components: int) -> Joint:
     return Joint(sampler.coordinates(components), draw)
 
 
-def _events(sc: Scenario, varied: tuple[Quantity, ...], values: Floats, threads: int | None) -> Floats:
+def _events(sc: Scenario, varied: tuple[Quantity, ...], values: Floats, threads: int | None, *, show: bool) -> Floats:
     """Whether each trial ended in each outcome, last without an equilibrium, and when it ended."""
     starts, sight, capture = setups(sc, varied, values)
     if not any(quantity.of_game for quantity in varied):
-        batch = simulate_batch(sc, starts, sight, capture, threads=threads)
+        batch = simulate_batch(sc, starts, sight, capture, threads=threads, progress=show)
         kind, defender, time, diverged = batch.kind, batch.defender, batch.time, batch.diverged
     else:
-        rows = (np.ascontiguousarray(np.atleast_2d(array)) for array in (starts, sight, capture))
+        rows = [np.ascontiguousarray(np.atleast_2d(array)) for array in (starts, sight, capture)]
         numbers = games_of(sc, varied, values)
-        kind, defender, time, _, diverged, _ = simulate_games(sc.interaction, numbers, *rows, threads=threads)
+        found = [
+            simulate_games(
+                sc.interaction,
+                numbers[some],
+                *(array if len(array) == 1 else array[some] for array in rows),
+                threads=threads,
+            )
+            for some in pieces(len(numbers), _PIECE, "games", show=show)
+        ]
+        kind, defender, time, _, diverged, _ = (np.concatenate(column) for column in zip(*found, strict=True))
     played = kind != UNPLAYED
     events = indicators(np.where(played, kind, 0), defender, sc.n, diverged)
     return np.asarray(np.vstack([events & played, ~played, time]), dtype=np.float64)

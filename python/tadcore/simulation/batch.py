@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
 from tadcore._shared.calls import public
 from tadcore._shared.html import as_html
+from tadcore._shared.progress import pieces
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import core_world, game_of
 from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import pandas
+
+
+_PIECE = 2**16  # games between two words of progress
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,6 +124,7 @@ def simulate_batch(
     scores: bool = False,
     seed: int = 0,
     first_trial: int = 0,
+    progress: bool = False,
 ) -> Batch:
     """Play M games that share the scenario's weights, horizon and step.
 
@@ -149,6 +154,8 @@ def simulate_batch(
     seed, first_trial : int
         What failures and disturbances are drawn from: row r is trial ``first_trial + r``, and has the course that
         ``simulate(sc, seed=seed, trial=first_trial + r)`` has. Without any they change nothing.
+    progress : bool
+        Whether to show a bar with the rate and the time left, where a terminal or a notebook watches.
 
     Returns
     -------
@@ -185,24 +192,23 @@ def simulate_batch(
     game = game_of(sc)
     refuse_between(sc, ending, passes=looking)
     world = core_world(sc)
-    if as_flag("scores", scores):
+    scored = as_flag("scores", scores)
+    if scored:
         _refuse_scores(ending, passes=looking)
-        kind, defender, time, diverged, scored = game.score_batch(
-            starts, sight, capture, threads=workers, world=world, seed=key, first_trial=first
-        )
-        return Batch(kind, defender, time, diverged, None, sc.n, scored)
-    kind, defender, time, diverged, passed = game.simulate_batch(
-        starts,
-        sight,
-        capture,
-        continuous=ending == "continuous",
-        passes=looking,
-        threads=workers,
-        world=world,
-        seed=key,
-        first_trial=first,
-    )
-    return Batch(kind, defender, time, diverged, passed if looking else None, sc.n)
+
+    def play(rows: slice) -> tuple[NDArray[Any], ...]:
+        own = [radii if len(radii) == 1 else radii[rows] for radii in (sight, capture)]
+        chance: dict[str, Any] = {"world": world, "seed": key, "first_trial": first + rows.start}
+        if scored:
+            return game.score_batch(starts[rows], *own, threads=workers, **chance)
+        options: dict[str, Any] = {"continuous": ending == "continuous", "passes": looking}
+        return game.simulate_batch(starts[rows], *own, threads=workers, **options, **chance)
+
+    played = [play(rows) for rows in pieces(len(starts), _PIECE, "games", show=as_flag("progress", progress))]
+    ends = [array if len(played) == 1 else np.concatenate([p[i] for p in played]) for i, array in enumerate(played[0])]
+    kind, defender, time, diverged, more = ends
+    passed = more if looking and not scored else None
+    return Batch(kind, defender, time, diverged, passed, sc.n, more if scored else None)
 
 
 def _refuse_scores(termination: Termination, *, passes: bool) -> None:

@@ -179,3 +179,19 @@ def test_nothing_that_was_given_is_changed(sc):
     assert np.array_equal(positions, before)
     assert radii.tolist() == [5.0, 2.25, 1.25]
     assert len(tadcore.simulate_batch(sc, positions.astype(np.float32))) == 4
+
+
+@pytest.mark.parametrize("scores", [False, True])
+def test_progress_changes_nothing(sc, scores, monkeypatch, capsys):
+    """In pieces a batch has the same bits; nothing is written where no terminal watches."""
+    monkeypatch.setattr("tadcore.simulation.batch._PIECE", 7)
+    shaken = sc.replace({"disturbance": {"defenders": 0.05}})
+    positions = starts(sc, 40)
+    sight = np.random.default_rng(3).uniform(1.0, 5.0, (40, 3))
+    for game in (sc,) if scores else (sc, shaken):
+        for radii in (None, sight):
+            whole = tadcore.simulate_batch(game, positions, radii, seed=5, first_trial=11, scores=scores)
+            shown = tadcore.simulate_batch(game, positions, radii, seed=5, first_trial=11, scores=scores, progress=True)
+            for name in ("kind", "defender", "time", "diverged", "scores"):
+                np.testing.assert_array_equal(getattr(whole, name), getattr(shown, name))
+    assert capsys.readouterr().err == ""
