@@ -10,6 +10,7 @@ from .intervals import OutcomeProbabilities, probabilities, probabilities_of, pr
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names
 from .radii import RadiusCurves
 from .radius import RadiusCurve
+from .reached import ReachedTime
 from .sequences import HalfWidth, mixture_interval
 from .single_radii import Breakpoints, SmallestRadius
 from .starts import StartShare, start_share_of
@@ -24,6 +25,7 @@ __all__ = [
     "OutcomeProbabilities",
     "RadiusCurve",
     "RadiusCurves",
+    "ReachedTime",
     "SmallestRadius",
     "StartShare",
     "Stopping",

@@ -29,9 +29,11 @@ from tadcore import _core
 from tadcore._shared.arrays import Floats, Integers, as_amount, as_index
 from tadcore._shared.html import as_html
 from tadcore._shared.shares import decimals, percent, share
+from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 
 from .outcomes import KINDS, TrialOutcomes, as_level, diverged_of, excluding, indicators, outcome_names
+from .reached import ReachedTime, reached
 from .stopping import level_of, stopping_of
 from .tally import Tally, instants
 
@@ -86,6 +88,29 @@ class Incidence:
     def __getitem__(self, name: str) -> Floats:
         """The curve of one outcome, shape (K + 1,)."""
         return np.asarray(self.estimate[self.names.index(name)])
+
+    def reached(self, at_least: float, outcome: str = "intercepted") -> ReachedTime:
+        """By when a share of all trials has ended in an outcome, with an interval from the band.
+
+        Parameters
+        ----------
+        at_least : float
+            The share, in (0, 1).
+        outcome : str
+            One of `names`.
+
+        Returns
+        -------
+        ReachedTime
+            The instant and what the true one lies between, or that there is none until T.
+
+        Raises
+        ------
+        ScenarioError
+            No such share or outcome.
+        """
+        row = self.names.index(one_of("outcome", outcome, self.names))
+        return reached(self.times, (self.estimate[row], self.low[row], self.high[row]), outcome, at_least, self.level)
 
     def to_pandas(self) -> pd.DataFrame:
         """A table with one row for each instant; columns (outcome, "estimate" | "low" | "high")."""
