@@ -197,12 +197,12 @@ def simulate_batch(
         _refuse_scores(ending, passes=looking)
 
     def play(rows: slice) -> tuple[NDArray[Any], ...]:
-        own = [radii if len(radii) == 1 else radii[rows] for radii in (sight, capture)]
+        reach, near = (radii if len(radii) == 1 else radii[rows] for radii in (sight, capture))
         chance: dict[str, Any] = {"world": world, "seed": key, "first_trial": first + rows.start}
         if scored:
-            return game.score_batch(starts[rows], *own, threads=workers, **chance)
+            return game.score_batch(starts[rows], reach, near, threads=workers, **chance)
         options: dict[str, Any] = {"continuous": ending == "continuous", "passes": looking}
-        return game.simulate_batch(starts[rows], *own, threads=workers, **options, **chance)
+        return game.simulate_batch(starts[rows], reach, near, threads=workers, **options, **chance)
 
     played = [play(rows) for rows in pieces(len(starts), _PIECE, "games", show=as_flag("progress", progress))]
     ends = [array if len(played) == 1 else np.concatenate([p[i] for p in played]) for i, array in enumerate(played[0])]
