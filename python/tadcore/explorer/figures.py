@@ -20,6 +20,7 @@ _MARKERS = {"o": "circle", "s": "square", "^": "triangle", "D": "diamond", "v": 
             "h": "hex", "*": "star", "X": "x"}  # fmt: skip
 PLANE, HISTORY = 580, 430
 """The largest widths of the plane and of a history, in pixels."""
+_TALL = 420  # pixels of the network, before its rows get lower
 _IN_A_ROW = 6  # names in the legend of the controls
 _LEAST = 1e-12  # that the axis of Θ ends at
 _ROOM = 0.35  # of the extent, kept free around the game: room to drag to
@@ -70,7 +71,9 @@ def timeline(sources: Sources, sc: Scenario, now: Span) -> Any:
     """Who sees whom, when: edge × time."""
     rows = [edge_name(p, q) for p in sc.constrained for q in sc.players if q != p]
     observers = list(sc.constrained)
-    plot = _history("network", now, height=70 + 13 * len(rows), y_range=rows[::-1])
+    row = max(7, min(13, _TALL // len(rows)))  # pixels
+    plot = _history("network", now, height=70 + row * len(rows), y_range=rows[::-1])
+    plot.yaxis.major_label_text_font_size = f"{min(row, 11)}px"
     colour = factor_cmap("observer", [look(p).colour for p in observers], observers)
     plot.hbar(y="edge", left="left", right="right", height=0.7, source=sources["bars"], color=colour, line_color=None)
     plot.ygrid.grid_line_color = None

@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from tadcore import _core
 from tadcore._shared.threads import cores
 from tadcore.analysis.certified import Proving
-from tadcore.analysis.maps import outcome_map
+from tadcore.analysis.replays import refuse_random
+from tadcore.game.compiled import game_of
 from tadcore.plotting.tools.outcomes import outcome_look
 from tadcore.scenario.model import Scenario
+from tadcore.simulation.rules import capture_rows, visibility_rows
 
 SIDE = 256
 """Pixels along each side."""
@@ -67,16 +69,16 @@ def outcomes_of(sc: Scenario) -> tuple[str, ...]:
 
 
 def sampled(sc: Scenario, player: str, region: Region, stop: _core.Stop) -> Iterator[Picture]:
-    """The outcome at the middle of every pixel: first of coarse ones, then from below."""
-    names, step = outcomes_of(sc), _pixel(region)
-    codes = np.repeat(
-        np.repeat(_played(sc, player, region, step * _COARSE, 0, SIDE // _COARSE), _COARSE, 0), _COARSE, 1
-    )
-    yield Picture(0.0, codes, names)
-    for first in range(0, SIDE, _STRIP):
-        codes = codes.copy()
-        codes[first : first + _STRIP] = _played(sc, player, region, step, first, _STRIP)
-        yield Picture((first + _STRIP) / SIDE, codes, names)
+    """The outcome at the middle of every pixel, from below: first of coarse ones, then of all."""
+    refuse_random(sc, "an outcome map", "tadcore.probability_map plays many trials from every start")
+    names = outcomes_of(sc)
+    codes = np.full((SIDE, SIDE), UNKNOWN, dtype=np.int64)
+    for pixels in (_COARSE, 1):
+        for first in range(0, SIDE, _STRIP):
+            codes = codes.copy()
+            strip = _played(sc, player, region, pixels, first, stop)
+            codes[first : first + _STRIP] = np.repeat(np.repeat(strip, pixels, axis=0), pixels, axis=1)
+            yield Picture((first + _STRIP) / SIDE if pixels == 1 else 0.0, codes, names)
 
 
 def proved(sc: Scenario, player: str, region: Region, stop: _core.Stop) -> Iterator[Picture]:
@@ -109,17 +111,21 @@ def proved(sc: Scenario, player: str, region: Region, stop: _core.Stop) -> Itera
         yield Picture(float(np.mean(codes != UNKNOWN)), codes, names)
 
 
-def _played(sc: Scenario, player: str, region: Region, step: NDArray[np.float64], first: int, rows: int) -> Codes:
-    """The outcomes at the middles of some rows of pixels of a size."""
+def _played(sc: Scenario, player: str, region: Region, pixels: int, first: int, stop: _core.Stop) -> Codes:
+    """The outcomes at the middles of squares of so many pixels, of the strip from one row of pixels on."""
     left, _, bottom, _ = region
-    columns = round((region[1] - left) / float(step[0]))
-    (x0, x1), (y0, y1) = (
-        left + step[0] * np.array([0.5, columns - 0.5]),
-        bottom + step[1] * (first + np.array([0.5, rows - 0.5])),
-    )
-    data = outcome_map(sc, player, x=(x0, x1, columns), y=(y0, y1, rows), threads=_threads()).dataset
-    code = np.where(data["kind"].values == 2, 2 + data["defender"].values.astype(np.int64), data["kind"].values)
-    return np.where(data["diverged"].values, sc.n + 2, code).astype(np.int64)
+    wide, high = pixels * _pixel(region)
+    x = left + wide * (np.arange(SIDE // pixels) + 0.5)
+    y = bottom + high * (first // pixels + np.arange(_STRIP // pixels) + 0.5)
+    starts = np.tile(sc.positions, (len(y), len(x), 1, 1))
+    starts[:, :, sc.players.index(player), 0] = x
+    starts[:, :, sc.players.index(player), 1] = y[:, np.newaxis]
+    rows = starts.reshape(-1, *sc.positions.shape)
+    sight, capture = visibility_rows(sc, None, len(rows)), capture_rows(sc, None, len(rows))
+    # The core itself, which can be stopped within a batch: one of a large team takes minutes.
+    kind, defender, _, diverged, _ = game_of(sc).simulate_batch(rows, sight, capture, threads=_threads(), stop=stop)
+    code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
+    return np.where(diverged, sc.n + 2, code).astype(np.int64).reshape(len(y), len(x))
 
 
 def _pixel(region: Region) -> NDArray[np.float64]:

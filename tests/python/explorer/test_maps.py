@@ -49,6 +49,11 @@ def middles(region):
     return left + (right - left) * inside, bottom + (top - bottom) * inside
 
 
+def _middle_ends():
+    half = 2.5 / SIDE
+    return [(REGION[0] + half, REGION[1] - half), (REGION[2] + half, REGION[3] - half)]
+
+
 def played(sc, player, places):
     """The code of the outcome from each place, by `simulate_batch`."""
     starts = np.repeat(sc.positions[None], len(places), axis=0)
@@ -61,7 +66,15 @@ def played(sc, player, places):
 @pytest.mark.parametrize("player", ["attacker", "d2"])
 def test_a_sampled_map_is_what_games_from_its_pixels_say(player):
     pictures = list(sampled(FULL, player, REGION, _core.Stop()))
-    assert [picture.share for picture in pictures] == [i / 16 for i in range(17)]
+    assert [picture.share for picture in pictures] == [0.0] * 16 + [(i + 1) / 16 for i in range(16)]
+    assert [(picture.codes == UNKNOWN).mean() for picture in pictures] == [1 - (i + 1) / 16 for i in range(16)] + [
+        0
+    ] * 16
+    whole = tadcore.outcome_map(
+        FULL, player, **{axis: (*ends, SIDE) for axis, ends in zip("xy", _middle_ends(), strict=True)}
+    )
+    kind, defender = whole.dataset["kind"].values, whole.dataset["defender"].values
+    assert (np.where(kind == 2, 2 + defender, kind) != pictures[-1].codes).mean() < 1e-3, "but for rounding of places"
     rows, columns = np.random.default_rng(3).integers(0, SIDE, (2, 300))
     x, y = middles(REGION)
     np.testing.assert_array_equal(
@@ -70,7 +83,7 @@ def test_a_sampled_map_is_what_games_from_its_pixels_say(player):
     assert len(pictures[-1].there) > 2
     coarse = (np.arange(0, SIDE, 4) + 2) / SIDE
     first = played(FULL, player, np.column_stack([-3.0 + 5.0 * coarse, np.full(SIDE // 4, -2.0 + 5.0 * coarse[9])]))
-    np.testing.assert_array_equal(pictures[0].codes[36], np.repeat(first, 4))
+    np.testing.assert_array_equal(pictures[15].codes[36], np.repeat(first, 4))
 
 
 def test_a_proved_map_is_what_the_certificate_says():
@@ -169,3 +182,24 @@ def test_a_closed_page_stops_what_it_makes():
     page.close()
     work.join()
     assert time.monotonic() - begin < 5.0, "the whole map takes minutes"
+
+
+def test_a_map_of_a_large_team_is_stopped_within_its_first_strip():
+    sc = tadcore.scenarios.load("paper-i1")
+    one = sc.defenders[0].model_dump(exclude_unset=True)
+    places = np.random.default_rng(1).uniform(-2, 2, (9, 2)).round(2)
+    crowd = sc.replace(
+        {"defenders": [{**one, "position": tuple(at), "visibility_radius": 2.0} for at in places.tolist()]}
+    )
+    page, desk = Page(Explorer(crowd)), Desk()
+    page.attach(desk)
+    page.backdrop.switches["sampled"].active = True
+    (work,) = page.backdrop._work.values()
+    time.sleep(1.0)
+    assert work._thread.is_alive(), "a strip takes longer"
+    begin = time.monotonic()
+    page.backdrop.switches["sampled"].active = False
+    work.join()
+    assert time.monotonic() - begin < 5.0
+    assert len(page.backdrop.sources["sampled"].data["image"]) == 0
+    page.close()
