@@ -150,6 +150,21 @@ class Game:
         first_trial: int = 0,
     ) -> tuple[NDArray[np.int8], NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
         """Kind, defender, time, whether the game diverged, and scores: timeout, captured, intercepted, d1 to dn."""
+    def score_courses(
+        self,
+        positions: NDArray[np.float64],
+        visibility_radii: NDArray[np.float64],
+        capture_radii: NDArray[np.float64],
+        *,
+        world: World,
+        seed: int,
+        offsets: NDArray[np.uint64],
+        steps: NDArray[np.uint64],
+        trials: NDArray[np.uint64],
+        column: int,
+        threads: int | None = None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Defender and the course of one score, of rows with draws of ``trials[offsets[r]:offsets[r + 1]]``."""
     def save_table(self) -> bytes:
         """The table of one-step transitions; for `load_table` of the same game and version."""
     def table_length(self, start: bytes) -> int:

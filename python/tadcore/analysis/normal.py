@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import numpy as np
 
 from tadcore._shared.arrays import Floats, Integers
@@ -10,6 +12,11 @@ from tadcore.game.outcome import OutcomeKind
 from tadcore.scenario.quantities import setups
 from tadcore.statistics.outcomes import outcome_names
 from tadcore.study.study import Study
+
+from .replications import CRUDE, Search
+from .splitting import Climb, StuckError, climb, pilot
+
+_PILOT = 1_000, 5_000  # points above each level in the pilot; more where these get stuck
 
 
 class NormalInputs:
@@ -59,6 +66,38 @@ class NormalInputs:
             raise ScenarioError(f"a draw of {path}", error.value, f"{error.rule}, {rule}") from None
         setup = setups(self._plan.scenario, self._plan.quantities, inputs)
         starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
-        kind, defender, _, _, scores = self._plan.game.score_batch(starts, sight, capture, threads=self._threads)
+        kind, defender, _, _, scores = self._plan.game.score_batch(
+            starts, sight, capture, threads=self._threads, world=self._plan.world
+        )
         who = np.where(kind == OutcomeKind.INTERCEPTED, defender, -1)
         return np.ascontiguousarray(scores[:, self._column]), who.astype(np.int64)
+
+
+class StartSearch(Search):
+    """Rare outcomes of games that their starts alone decide."""
+
+    def __init__(self, study: Study, event: str, error: float, threads: int | None) -> None:
+        super().__init__(study.seed, event, error)
+        self.score = NormalInputs(study, event, threads)
+        self._rng = self.generator(0)
+
+    def crude(self) -> Floats:
+        """Scores of games as the study draws them."""
+        self._first = self._rng.standard_normal((CRUDE, self.score.dim))
+        self._scores, _ = self.score(self._first)
+        return self._scores
+
+    def prepare(self) -> Generator[int, None, float]:
+        """Levels, moves and lengths of chains."""
+        for points in _PILOT:
+            try:
+                self.ladder = yield from pilot(self.score, self._rng, self._first, self._scores, points)
+                break
+            except StuckError:  # it lost the way that leads there, which more points may keep
+                if points == _PILOT[-1]:
+                    raise
+        return self.ladder.inflation
+
+    def group(self, numbers: range, count: int) -> Generator[int, None, Climb]:
+        """Replications side by side."""
+        return climb(self.score, self.score.dim, self.ladder, [self.generator(r) for r in numbers], count)

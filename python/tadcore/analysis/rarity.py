@@ -36,7 +36,8 @@ class RareEvent:
     replications : ndarray of float64, shape (R,)
         The estimate of each, independent of the others.
     levels : ndarray of float64, shape (m,)
-        Scores that were climbed to one after another, the last just below 0.
+        Scores that were climbed to one after another, the last just below 0. Empty where paths were split: there every
+        replication has levels of its own.
     rates : ndarray of float64, shape (R, m)
         Of each replication the share above each level among what was above the level before.
     shares : dict of str to float

@@ -80,11 +80,8 @@ class Climb:
     """Share of the points above each level, (R, m); 0 from where none were."""
     ended: list[Integers]
     """Of each replication the codes of the points that reached the event."""
-
-    @property
-    def estimates(self) -> Floats:
-        """One estimate for each replication."""
-        return np.asarray(np.prod(self.rates, axis=1))
+    estimates: Floats
+    """One for each replication."""
 
 
 class _Points(NamedTuple):
@@ -161,7 +158,7 @@ def climb(
             kept.append(state)
             yield len(state.u)
         now = _joined(kept)
-    return Climb(rates, [now.code[now.owner == r] for r in range(len(rngs))])
+    return Climb(rates, [now.code[now.owner == r] for r in range(len(rngs))], np.prod(rates, axis=1))
 
 
 def _seeds(rng: np.random.Generator, many: int, chains: int) -> Integers:

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyAr
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use tadcore::ensemble::{self, Batch, Between};
+use tadcore::ensemble::{self, Batch, Between, Lineages};
 use tadcore::game::{Criterion, Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
@@ -364,6 +364,53 @@ impl Game {
                 entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
                 entries(py, ends.len(), |i| ends[i].diverged)?,
                 shaped(py, &scores, [ends.len(), ensemble::columns(self.game.n())])?,
+            ))
+        })
+    }
+
+    /// Runs that share a past and part: row r has the draws of the trials `trials[offsets[r]:offsets[r + 1]]`, of each
+    /// from the step of the same place in `steps` on. The defender that intercepted, −1 where none did, and the course
+    /// of one score over all instants.
+    #[pyo3(signature = (positions, visibility_radii, capture_radii, *, world, seed, offsets, steps, trials, column,
+        threads=None))]
+    // A keyword for each rule.
+    #[allow(clippy::type_complexity, clippy::too_many_arguments)]
+    fn score_courses<'py>(
+        &self,
+        py: Python<'py>,
+        positions: PyReadonlyArray3<'py, f64>,
+        visibility_radii: PyReadonlyArray2<'py, f64>,
+        capture_radii: PyReadonlyArray2<'py, f64>,
+        world: &Bound<'py, World>,
+        seed: u64,
+        offsets: PyReadonlyArray1<'py, u64>,
+        steps: PyReadonlyArray1<'py, u64>,
+        trials: PyReadonlyArray1<'py, u64>,
+        column: usize,
+        threads: Option<usize>,
+    ) -> PyResult<(Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<f64>>)> {
+        guarded(|| {
+            let dim = positions.as_array().dim().2;
+            let positions = copied(py, &positions)?;
+            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let whole = |array: &PyReadonlyArray1<'py, u64>| -> Vec<usize> {
+                array.as_array().iter().map(|&x| usize::try_from(x).unwrap_or(usize::MAX)).collect()
+            };
+            let (offsets, steps) = (whole(&offsets), whole(&steps));
+            let trials: Vec<u64> = trials.as_array().iter().copied().collect();
+            let policy = self.policy(py)?;
+            let world = world.get().core();
+            let (ends, courses) = detach::interruptible(py, |cancel| {
+                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
+                let lineages = Lineages { offsets: &offsets, steps: &steps, trials: &trials };
+                let chances = Chances { world, seed, trial: 0 };
+                ensemble::run_courses(&policy, &batch, chances, lineages, column, threads, cancel)
+            })?
+            .map_err(|error| errors::run(py, &self.game, error))?;
+            let instants = self.game.grid().steps() + 1;
+            Ok((
+                entries(py, ends.len(), |i| ends[i].outcome.defender())?,
+                shaped(py, &courses, [ends.len(), instants])?,
             ))
         })
     }

@@ -170,9 +170,9 @@ def test_any_threads_and_any_call_give_the_same():
 
 
 def test_more_replications_where_the_first_spread_too_much(monkeypatch):
-    from tadcore.analysis import rare_events
+    from tadcore.analysis import replications
 
-    monkeypatch.setattr(rare_events, "_AIM", 3.0)
+    monkeypatch.setattr(replications, "AIM", 3.0)
     study = tadcore.Study(still(), {"attacker.position": Gaussian([3.0, 0.0], 0.6)}, trials=1, seed=1)
     found = tadcore.rare(study, error=0.05)
     assert len(found.replications) > 20
@@ -216,7 +216,10 @@ def test_what_is_refused_by_name():
         (study({"attacker.position": lambda rng, size: rng.normal(size=(size, 2))}), "quantiles"),
         (study({"attacker.position": Cycle([[3.0, 0.0]])}), "quantiles"),
         (study({"attacker.control_weight": Box(1.0, 2.0)}), "attacker.control_weight"),
-        (study(normal, sc.replace({"d1.disturbance": 0.1})), "without failures and disturbances"),
+        (
+            study({"attacker.position": Cycle([[3.0, 0.0]])}, sc.replace({"d1.disturbance": 0.1})),
+            "a sampler that draws",
+        ),
         (study(normal, termination="continuous"), "sampled"),
     ]
     for given, words in cases:
@@ -249,3 +252,121 @@ def test_a_result_reads_well():
 def test_annuli_climb_too():
     study = tadcore.Study(still(), {"attacker.position": Annulus([0.0, 0.0], 0.4999, 20.0)}, trials=1, seed=4)
     agrees(tadcore.rare(study), (0.5**2 - 0.4999**2) / (20.0**2 - 0.4999**2))
+
+
+def walk(b, size, **changes):
+    """An attacker that is shaken, of whom a disk as large as a half-plane is b away: 40 steps of 0.01."""
+    wide = 1e5
+    sc = tadcore.Scenario(
+        interaction="I1",
+        horizon=0.4,
+        step=0.01,
+        attacker={"position": [0.0, 0.0], "control_weight": 1e30, "capture_radius": wide, "disturbance": size},
+        target={"position": [wide + b, 0.0], "control_weight": 1e30},
+        defenders=[{"position": [-wide, 0.0], "control_weight": 1e30, "capture_radius": 0.5}],
+    )
+    return sc.replace(changes) if changes else sc
+
+
+def first_passage(b, spread, steps):
+    """P(a walk of so many normal steps reaches b), by Gauss-Legendre quadrature of its density below b."""
+    nodes, weights = np.polynomial.legendre.leggauss(800)
+    low = b - 14.0 * spread * math.sqrt(steps)
+    x, w = low + (nodes + 1.0) / 2.0 * (b - low), weights * (b - low) / 2.0
+    kernel = stats.norm.pdf(x[:, None], x[None, :], spread)
+    density, out = stats.norm.pdf(x, 0.0, spread), stats.norm.sf(b / spread)
+    for _ in range(steps - 1):
+        out += np.sum(w * density * stats.norm.sf((b - x) / spread))
+        density = kernel @ (w * density)
+    return float(out)
+
+
+def finished(moves):
+    while True:
+        try:
+            next(moves)
+        except StopIteration as stop:
+            return stop.value
+
+
+def test_split_paths_are_unbiased_for_a_random_walk():
+    """400 replications of 200 paths, against a quadrature: P = 2.8e-5."""
+    from tadcore.analysis.path_splitting import PathSearch
+
+    truth = first_passage(2.6, 0.1, 40)
+    assert truth == pytest.approx(2.798e-5, rel=1e-3)
+    study = tadcore.Study(walk(2.6, 1.0), {}, trials=1, seed=11)
+    search = PathSearch(study, "captured", 0.1, None)
+    estimates = finished(search.group(range(1, 401), 200)).estimates
+    mean, _, error = summary(estimates, 0.95)
+    assert error < 0.08
+    assert abs(mean - truth) < 4.0 * error * truth, (mean, truth, error)
+    agrees(tadcore.rare(study, error=0.1), truth)
+
+
+def test_starts_and_paths_are_both_random():
+    """The start is normal too: the walk's first step is that much longer."""
+    study = tadcore.Study(walk(3.0, 1.0), {"attacker.position.x": Gaussian(0.0, 0.3)}, trials=1, seed=12)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(60)
+    parts = [first_passage(3.0 - 0.3 * x, 0.1, 40) if 0.3 * x < 2.5 else 1.0 for x in nodes]
+    truth = float(np.dot(weights, parts) / weights.sum())
+    assert 1e-6 < truth < 1e-4
+    agrees(tadcore.rare(study, error=0.1), truth)
+
+
+@pytest.mark.parametrize(
+    ("changes", "event"),
+    [
+        ({"attacker.disturbance": 0.03}, "captured"),
+        ({"d*.sensing": {"mean_time_to_failure": 300.0}, "d*.disturbance": 0.02}, "d3"),
+        ({"d*.sensing": {"mean_time_detected": 5.0, "mean_time_missed": 0.1}, "attacker.disturbance": 0.02}, "d2"),
+    ],
+)
+def test_split_paths_against_crude_monte_carlo(changes, event):
+    """200 replications of 500 paths each, with failures, in limited sight: their mean is the crude estimate."""
+    from tadcore.analysis.path_splitting import PathSearch
+
+    sc = tadcore.scenarios.load("paper-i1").replace({"step": 0.02, **changes})
+    study = tadcore.Study(sc, {}, trials=300_000, seed=3)
+    crude = study.run(keep="counts").probabilities()
+    count = int(crude.count[crude.names.index(event)])
+    assert 20 < count < 1000, count
+    found = finished(PathSearch(study, event, 0.1, None).group(range(1, 201), 500))
+    mean, _, error = summary(found.estimates, 0.95)
+    assert error < 0.3
+    apart = math.hypot(error * mean, math.sqrt(count) / 300_000)
+    assert abs(mean - count / 300_000) < 4.0 * apart, (mean, error, count)
+
+
+def test_where_splitting_paths_does_not_pay_it_is_said():
+    """A failure that decides is not approached, and a start too near to an end leaves nothing to climb."""
+    sc = tadcore.scenarios.load("paper-i1").replace({"step": 0.02})
+    failing = sc.replace({"d*.sensing": {"mean_time_to_failure": 300.0}, "d*.disturbance": 0.02})
+    with pytest.raises(ScenarioError, match=r"for which splitting pays.* crude Monte Carlo \d|paths lead to"):
+        tadcore.rare(tadcore.Study(failing, {}, trials=1, seed=1), "d3", error=0.2)
+    sc = sc.replace({"attacker.disturbance": 0.02})
+    with pytest.raises(ScenarioError, match=r"most replications of 800 paths died out|splitting pays"):
+        tadcore.rare(tadcore.Study(sc, {}, trials=1, seed=1))
+    with pytest.raises(ScenarioError, match="an outcome that comes at an instant"):
+        tadcore.rare(tadcore.Study(sc, {}, trials=1, seed=1), "timeout")
+
+
+def test_links_without_failures_are_part_of_the_game():
+    """Who is told of the attacker intercepts it: the scores are those of a batch of the same scenario."""
+    from tadcore.analysis.normal import NormalInputs
+
+    sc = tadcore.scenarios.load("paper-i1").replace({"step": 0.02, "d*.communication": {"radius": 9.0}})
+    assert not sc.is_random
+    study = around(sc, 0.3)
+    inputs = NormalInputs(study, "captured", None)
+    normal = np.random.default_rng(1).standard_normal((200, inputs.dim))
+    drawn = inputs.inputs(normal)
+    order = [
+        study.columns.index(f"{q}.position.x")
+        for q in ("defenders.0", "defenders.1", "defenders.2", "target", "attacker")
+    ]
+    positions = np.stack([drawn[:, [i, i + 1]] for i in order], axis=1)
+    batch = tadcore.simulate_batch(sc, positions, scores=True)
+    plain = tadcore.simulate_batch(sc.replace({"d*.communication": None}), positions, scores=True)
+    assert np.array_equal(inputs(normal)[0], batch.scores[:, 1])
+    assert not np.array_equal(batch.scores, plain.scores)

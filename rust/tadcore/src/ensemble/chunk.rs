@@ -77,10 +77,10 @@ impl<'a> Chunk<'a> {
         w: &mut Worker,
         cancel: &CancelToken,
     ) -> Result<(), RunError> {
-        let Answers { ends, scores } = answers;
+        let Answers { ends, scores, course } = answers;
         let mut scores = match scores {
             [] => None,
-            out => Some(Scores::new(&mut self.trials, self.width, out)?),
+            out => Some(Scores::new(&mut self.trials, self.width, course, out)?),
         };
         let mut watch = (between != Between::NOTHING).then(|| Watch::new(between, ends.len()));
         let transitions = self.trials.policy.transitions();

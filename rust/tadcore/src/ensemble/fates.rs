@@ -6,6 +6,7 @@
 use super::agenda::Agenda;
 use super::block::{BLOCK, Shape};
 use super::flips::Flips;
+use super::lineages::{Lineages, Numbers};
 use super::noise::Noise;
 use crate::error::NoMemory;
 use crate::memory::{MOST_BYTES, reserve_exact, within};
@@ -23,13 +24,15 @@ const WHAT: &str = "what fails and who is told in the trials of a batch";
 pub(super) struct Played<'a> {
     pub(super) chances: Chances<'a>,
     pub(super) conditions: &'a Conditions,
+    /// Whose draws each row has, where that is not the trial of its number.
+    pub(super) lineages: Option<Lineages<'a>>,
 }
 
 /// What happens to the trials of a chunk.
 pub(super) struct Fates<'a> {
     conditions: &'a Conditions,
-    /// How many trials come before the chunk, from trial 0 on.
-    first: u64,
+    /// The trials whose draws its rows have.
+    numbers: Numbers,
     shape: Shape,
     failing: Option<Failing>,
     noise: Option<Noise>,
@@ -131,8 +134,8 @@ impl<'a> Fates<'a> {
         width: Width,
         blocks: &mut Blocks,
     ) -> Result<Self, NoMemory> {
-        let Played { conditions, chances } = *played;
-        let first = chances.trial + first as u64;
+        let Played { conditions, chances, lineages } = *played;
+        let numbers = Numbers::new(chances.trial + first as u64, lineages, first, trials);
         let count = blocks.far.len();
         let failures = &conditions.failures;
         // Masks, what was seen, heard and told last, and the agenda: asked for here together, and given back.
@@ -149,19 +152,28 @@ impl<'a> Fates<'a> {
         if relay.is_some() || !failures.is_empty() {
             let mut network = Box::new(Network::new(width, shape, relay));
             if !failures.is_empty() {
-                failing = Some(Failing::new(failures, chances.seed, first, trials, steps, &shape, width, &mut network));
+                failing =
+                    Some(Failing::new(failures, chances.seed, &numbers, trials, steps, &shape, width, &mut network));
             }
             blocks.network = Some(network);
         }
         let noise = conditions.spread.as_ref().map(|spread| Noise::new(spread, shape, chances.seed, width));
-        Ok(Self { conditions, first, shape, failing, noise })
+        Ok(Self { conditions, numbers, shape, failing, noise })
     }
 
     /// Moves what fails on to step k; whether anything may have changed in the last block.
     pub(super) fn fail(&mut self, k: usize, blocks: &mut Blocks) -> bool {
         let live = blocks.live;
-        let (Some(failing), Some(network)) = (&mut self.failing, &mut blocks.network) else { return false };
-        failing.advance(k, live, network, &self.shape)
+        let mut changed = false;
+        if let (Some(failing), Some(network)) = (&mut self.failing, &mut blocks.network) {
+            changed = failing.advance(k, live, &self.numbers, network, &self.shape);
+        }
+        for row in self.numbers.turn(k) {
+            if let Some(failing) = &mut self.failing {
+                failing.flips.part(k, row, &self.numbers, &mut failing.agenda);
+            }
+        }
+        changed
     }
 
     /// The trial `gone` is over; the trial `last` moves to the place that it had.
@@ -175,7 +187,7 @@ impl<'a> Fates<'a> {
     /// Shakes all trials after the step from t_k.
     pub(super) fn shake(&mut self, k: usize, who: &[u32], blocks: &mut Blocks) {
         if let Some(noise) = &mut self.noise {
-            noise.add(k, self.first, who, blocks);
+            noise.add(k, &self.numbers, who, blocks);
         }
     }
 
@@ -202,12 +214,12 @@ impl<'a> Fates<'a> {
 }
 
 impl Failing {
-    /// All chains of the trials from trial `first` on; gives the network its masks.
+    /// All chains of the trials of a chunk; gives the network its masks.
     #[allow(clippy::too_many_arguments, reason = "what fails, whose numbers, and where it is written")]
     fn new(
         failures: &Failures,
         seed: u64,
-        first: u64,
+        numbers: &Numbers,
         trials: usize,
         steps: usize,
         shape: &Shape,
@@ -224,16 +236,16 @@ impl Failing {
             relay.up = words(Part::Links, Relay::words(shape.rows));
         }
         let mut agenda = Agenda::new(steps);
-        let mut flips = Flips::new(failures, seed, first, width);
-        flips.begin(trials, &mut agenda, |trial, chain| targets[chain].flip(trial, network, shape));
+        let mut flips = Flips::new(failures, seed, width);
+        flips.begin(trials, numbers, &mut agenda, |trial, chain| targets[chain].flip(trial, network, shape));
         Self { targets, flips, agenda, places: (0..trials as u32).collect() }
     }
 
     /// Flips what is due at step k; whether anything may have changed in the last block.
-    fn advance(&mut self, k: usize, live: usize, network: &mut Network, shape: &Shape) -> bool {
+    fn advance(&mut self, k: usize, live: usize, numbers: &Numbers, network: &mut Network, shape: &Shape) -> bool {
         let (places, targets) = (&self.places, &self.targets);
         let mut last = false;
-        self.flips.flip(k, &mut self.agenda, |trial, chain| {
+        self.flips.flip(k, numbers, &mut self.agenda, |trial, chain| {
             let place = places[trial];
             if place == GONE {
                 return false;

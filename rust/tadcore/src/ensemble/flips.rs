@@ -6,6 +6,7 @@
 //! | H = 1 + ⌊ln u / ln(1 − p)⌋ | [`Tile::draw`] | steps up to it |
 
 use super::agenda::{Agenda, Entry};
+use super::lineages::Numbers;
 use crate::network::Failures;
 use crate::random::{Chain, Draws, NEVER, first_uniforms, key, ln};
 use crate::simd::{Width, dispatch};
@@ -21,8 +22,8 @@ pub(super) struct Flips {
     entities: Vec<(u32, u32)>,
     shift: u32,
     seed: u64,
-    /// The first trial.
-    first: u64,
+    /// The state under which each chain stands on the agenda, where rows part; what stands there besides is void.
+    now: Vec<u32>,
     tile: Box<Tile>,
     width: Width,
 }
@@ -38,7 +39,7 @@ struct Tile {
 }
 
 impl Flips {
-    pub(super) fn new(failures: &Failures, seed: u64, first: u64, width: Width) -> Self {
+    pub(super) fn new(failures: &Failures, seed: u64, width: Width) -> Self {
         let (chains, entities): (Vec<Chain>, Vec<_>) = failures.laws().unzip();
         let tile = Tile {
             entries: [Entry::default(); TILE],
@@ -48,20 +49,29 @@ impl Flips {
             count: 0,
         };
         let shift = chains.len().next_power_of_two().trailing_zeros();
-        Self { chains, entities, shift, seed, first, tile: Box::new(tile), width }
+        Self { chains, entities, shift, seed, now: Vec::new(), tile: Box::new(tile), width }
     }
 
     /// Begins every chain, and puts its first flip on the agenda; tells of each that begins down.
-    pub(super) fn begin(&mut self, trials: usize, agenda: &mut Agenda, mut down: impl FnMut(usize, usize)) {
+    pub(super) fn begin(
+        &mut self,
+        trials: usize,
+        numbers: &Numbers,
+        agenda: &mut Agenda,
+        mut down: impl FnMut(usize, usize),
+    ) {
+        if numbers.part() {
+            self.now = vec![0; trials << self.shift];
+        }
         for trial in 0..trials {
-            let draws = Draws { seed: self.seed, trial: self.first + trial as u64 };
+            let draws = Draws { seed: self.seed, trial: numbers.of(trial as u64) };
             for c in 0..self.chains.len() {
                 let (entity, bits) = self.entities[c];
                 let up = self.chains[c].begins_up(|| draws.first(bits, entity, 0));
                 if !up {
                     down(trial, c);
                 }
-                self.next(0, Entry { number: (trial << self.shift | c) as u32, state: up.into() }, agenda);
+                self.next(0, Entry { number: (trial << self.shift | c) as u32, state: up.into() }, numbers, agenda);
             }
         }
         self.draw(0, agenda);
@@ -69,13 +79,33 @@ impl Flips {
 
     /// Flips what is due at step k, and puts the next flips on the agenda; `there` does what the flip of a chain of a trial
     /// changes, and says whether that trial still plays.
-    pub(super) fn flip(&mut self, k: usize, agenda: &mut Agenda, mut there: impl FnMut(usize, usize) -> bool) {
+    pub(super) fn flip(
+        &mut self,
+        k: usize,
+        numbers: &Numbers,
+        agenda: &mut Agenda,
+        mut there: impl FnMut(usize, usize) -> bool,
+    ) {
         while let Some(piece) = agenda.take(k) {
             for &Entry { number, state } in piece.entries() {
+                if self.now.get(number as usize).is_some_and(|&now| now != state) {
+                    continue;
+                }
                 if there((number >> self.shift) as usize, self.chain(number)) {
-                    self.next(k, Entry { number, state: (state + 2) ^ 1 }, agenda);
+                    self.next(k, Entry { number, state: (state + 2) ^ 1 }, numbers, agenda);
                 }
             }
+        }
+        self.draw(k, agenda);
+    }
+
+    /// Draws again when the chains of a row flip next, which are as they are at t_k.
+    pub(super) fn part(&mut self, k: usize, row: usize, numbers: &Numbers, agenda: &mut Agenda) {
+        for c in 0..self.chains.len() {
+            let number = (row << self.shift | c) as u32;
+            // Numbers of another place, and what stands on the agenda is void.
+            let state = self.now[number as usize] + 2;
+            self.next(k, Entry { number, state }, numbers, agenda);
         }
         self.draw(k, agenda);
     }
@@ -87,13 +117,16 @@ impl Flips {
 
     /// Adds the next flip of a chain to the tile, if there is one.
     #[inline]
-    fn next(&mut self, k: usize, entry: Entry, agenda: &mut Agenda) {
+    fn next(&mut self, k: usize, entry: Entry, numbers: &Numbers, agenda: &mut Agenda) {
         let c = self.chain(entry.number);
+        if let Some(now) = self.now.get_mut(entry.number as usize) {
+            *now = entry.state;
+        }
         let stays = self.chains[c].stays(entry.state & 1 == 1);
         if stays == 0.0 {
             return;
         }
-        let ((entity, bits), trial) = (self.entities[c], self.first + u64::from(entry.number >> self.shift));
+        let ((entity, bits), trial) = (self.entities[c], numbers.of(u64::from(entry.number >> self.shift)));
         let tile = &mut *self.tile;
         let at = tile.count;
         tile.entries[at] = entry;

@@ -77,7 +77,12 @@ fn play(game: &Game, batch: &Batch, i: usize, between: Between, cancel: &CancelT
     };
     let mut ends = [End::NOT_PLAYED];
     let mut chunk = Chunk::new(&policy, &row, None, 0, 1, Width::in_use())?;
-    chunk.play(between, Answers { ends: &mut ends, scores: &mut [] }, &mut Worker::new(&policy), cancel)?;
+    chunk.play(
+        between,
+        Answers { ends: &mut ends, scores: &mut [], course: None },
+        &mut Worker::new(&policy),
+        cancel,
+    )?;
     let [end] = ends;
     Ok(GameEnd::Played { end, time: game.grid().time_after(end.step, end.after) })
 }

@@ -21,6 +21,7 @@ mod chunk;
 mod fates;
 mod flips;
 pub mod games;
+mod lineages;
 mod noise;
 mod scores;
 mod trials;
@@ -31,12 +32,14 @@ use rayon::prelude::*;
 
 use crate::cancel::CancelToken;
 use crate::error::RunError;
+use crate::game::validation::rule;
 use crate::memory;
 use crate::policy::{Policy, step_table};
 use crate::simd::Width;
 use crate::simulation::{Chances, Outcome, Record, Setup, Termination};
 use chunk::{Chunk, Worker};
 use fates::Played;
+pub use lineages::Lineages;
 pub use scores::columns;
 use tadcore_kernels::ensemble::{block, sweep};
 
@@ -163,7 +166,7 @@ pub fn run_with(
     if let Some(chances) = chances.filter(|_| between != Between::NOTHING) {
         chances.world.refuse_between()?;
     }
-    Ok(checked(policy, batch, between, chances, false, threads, cancel)?.0)
+    Ok(checked(policy, batch, between, chances, None, Scored::No, threads, cancel)?.0)
 }
 
 /// The same with how far each trial was from every outcome, [`columns`] numbers each: all trials are played to T, and
@@ -178,23 +181,57 @@ pub fn run_scored(
     threads: Option<usize>,
     cancel: &CancelToken,
 ) -> Result<(Vec<End>, Vec<f64>), RunError> {
-    checked(policy, batch, Between::NOTHING, chances, true, threads, cancel)
+    checked(policy, batch, Between::NOTHING, chances, None, Scored::Columns, threads, cancel)
+}
+
+/// The same for rows that share a past and part ([`Lineages`]), with the course of one score: K + 1 numbers each, of
+/// which that at t_k is what the score would be if the game ended there.
+///
+/// # Errors
+/// As [`run_with`], and for lineages or a column that cannot be.
+#[allow(clippy::too_many_arguments, reason = "what is played, whose draws, and what is followed")]
+pub fn run_courses(
+    policy: &Policy,
+    batch: &Batch,
+    chances: Chances,
+    lineages: Lineages,
+    column: usize,
+    threads: Option<usize>,
+    cancel: &CancelToken,
+) -> Result<(Vec<End>, Vec<f64>), RunError> {
+    let game = policy.game();
+    lineages.check(batch.len(game.n() + 2), game.grid().steps())?;
+    rule("column", column as f64, column < columns(game.n()), "the number of a score")?;
+    let (between, scored) = (Between::NOTHING, Scored::Course(column));
+    checked(policy, batch, between, Some(chances), Some(lineages), scored, threads, cancel)
+}
+
+/// Which scores are asked for.
+#[derive(Clone, Copy)]
+enum Scored {
+    No,
+    /// Of every outcome, at the end.
+    Columns,
+    /// One, after every instant.
+    Course(usize),
 }
 
 /// Checks every row, and plays.
+#[allow(clippy::too_many_arguments, reason = "what is played, whose draws, and what is asked for")]
 fn checked(
     policy: &Policy,
     batch: &Batch,
     between: Between,
     chances: Option<Chances>,
-    scored: bool,
+    lineages: Option<Lineages>,
+    scored: Scored,
     threads: Option<usize>,
     cancel: &CancelToken,
 ) -> Result<(Vec<End>, Vec<f64>), RunError> {
     let (n, m) = (policy.game().n(), policy.game().constrained());
     let trials = batch.len(n + 2);
     let conditions = chances.map(|chances| chances.conditions(policy.game(), trials as u64)).transpose()?;
-    let played = chances.zip(conditions.as_ref()).map(|(chances, conditions)| Played { chances, conditions });
+    let played = chances.zip(conditions.as_ref()).map(|(chances, conditions)| Played { chances, conditions, lineages });
     for i in 0..trials {
         if i % CHECKED == 0 {
             cancel.check()?;
@@ -203,11 +240,14 @@ fn checked(
     }
     let (mut ends, mut scores) = (Vec::new(), Vec::new());
     memory::grow("the outcomes of a batch", &mut ends, trials, End::NOT_PLAYED)?;
-    if scored {
-        memory::grow("the scores of a batch", &mut scores, trials.saturating_mul(columns(n)), 0.0)?;
-    }
+    let (width, course) = match scored {
+        Scored::No => (0, None),
+        Scored::Columns => (columns(n), None),
+        Scored::Course(column) => (policy.game().grid().steps() + 1, Some(column)),
+    };
+    memory::grow("the scores of a batch", &mut scores, trials.saturating_mul(width), 0.0)?;
     let threads = threads_for(threads, trials.div_ceil(block::BLOCK))?;
-    let answers = Answers { ends: &mut ends, scores: &mut scores };
+    let answers = Answers { ends: &mut ends, scores: &mut scores, course };
     play(policy, batch, played.as_ref(), between, threads, Width::in_use(), answers, cancel)?;
     Ok((ends, scores))
 }
@@ -237,6 +277,8 @@ fn most_trials(size: usize) -> usize {
 struct Answers<'a> {
     ends: &'a mut [End],
     scores: &'a mut [f64],
+    /// The score that is followed, if one is.
+    course: Option<usize>,
 }
 
 impl<'a> Answers<'a> {
@@ -247,7 +289,7 @@ impl<'a> Answers<'a> {
         let of_chunk = |ends: &'a mut [End]| {
             let (scores, others) = std::mem::take(&mut rest).split_at_mut(columns * ends.len());
             rest = others;
-            Self { ends, scores }
+            Self { ends, scores, course: self.course }
         };
         self.ends.chunks_mut(size).map(of_chunk).collect()
     }
@@ -310,7 +352,7 @@ mod tests {
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![End::NOT_PLAYED; 50];
-                    let answers = Answers { ends: &mut ends, scores: &mut [] };
+                    let answers = Answers { ends: &mut ends, scores: &mut [], course: None };
                     play(&policy, &batch, None, Between::NOTHING, 1, width, answers, &cancel).expect("a batch");
                     (ends, policy.save_transitions(&cancel).expect("memory"))
                 });
@@ -378,13 +420,13 @@ mod tests {
                 let played = Width::all().into_iter().map(|width| {
                     let policy = Policy::new(game.clone(), DEFAULT_TABLE_BYTES, &cancel).expect("an equilibrium");
                     let mut ends = vec![End::NOT_PLAYED; trials];
-                    let played = Some(Played { chances, conditions: &conditions });
-                    let answers = Answers { ends: &mut ends, scores: &mut [] };
+                    let played = Some(Played { chances, conditions: &conditions, lineages: None });
+                    let answers = Answers { ends: &mut ends, scores: &mut [], course: None };
                     play(&policy, &batch, played.as_ref(), Between::NOTHING, 1, width, answers, &cancel)
                         .expect("a batch");
                     let table = policy.save_transitions(&cancel).expect("memory");
                     let (mut scored, mut scores) = (vec![End::NOT_PLAYED; trials], vec![0.0; trials * columns(n)]);
-                    let answers = Answers { ends: &mut scored, scores: &mut scores };
+                    let answers = Answers { ends: &mut scored, scores: &mut scores, course: None };
                     play(&policy, &batch, played.as_ref(), Between::NOTHING, 1, width, answers, &cancel)
                         .expect("scores");
                     assert_eq!(ends, scored, "{interaction:?} {n} {dim} {which}");

@@ -4,6 +4,7 @@
 //! plain loops over the tile, and then every block by its own columns.
 
 use super::block::{BLOCK, Blocks, Shape};
+use super::lineages::Numbers;
 use crate::random::{Counters, Purpose, key, normals};
 use crate::simd::{Number, Width, dispatch};
 
@@ -26,8 +27,8 @@ impl Noise {
         Self { spread: spread.to_vec(), shape, key: key(seed), width, added }
     }
 
-    /// Shakes every trial after the step from t_k; the chunk's trials count from `first`.
-    pub(super) fn add(&mut self, k: usize, first: u64, who: &[u32], blocks: &mut Blocks) {
+    /// Shakes every trial after the step from t_k.
+    pub(super) fn add(&mut self, k: usize, whose: &Numbers, who: &[u32], blocks: &mut Blocks) {
         let live = blocks.live;
         let numbers = self.shape.size * self.shape.dim;
         for start in (0..live).step_by(TILE) {
@@ -35,7 +36,7 @@ impl Noise {
             let trials: [u64; TILE] = std::array::from_fn(|t| {
                 // Places past the last trial repeat the first of their block.
                 let place = start + t.min(places - 1);
-                first + u64::from(who[if place < live { place } else { place / BLOCK * BLOCK }])
+                whose.of(who[if place < live { place } else { place / BLOCK * BLOCK }].into())
             });
             let z = &mut blocks.z[start / BLOCK * numbers..][..places / BLOCK * numbers];
             shaken(self.width, self, k as u32, &trials, z);

@@ -49,8 +49,16 @@ pub(super) struct Scores<'a> {
     /// A bit for each place whose game is over, and for each whose game diverged.
     over: Vec<u32>,
     diverged: Vec<u32>,
-    /// Where the scores of each trial go.
+    /// Where the scores of each trial go; where the course of one is asked for, its value after every instant.
     out: &'a mut [f64],
+    course: Option<Course>,
+}
+
+/// Which score is followed, and over how many instants.
+#[derive(Clone, Copy)]
+struct Course {
+    column: usize,
+    instants: usize,
 }
 
 impl<'a> Scores<'a> {
@@ -58,7 +66,14 @@ impl<'a> Scores<'a> {
     ///
     /// # Errors
     /// [`NoMemory`] where there is none for so many.
-    pub(super) fn new(trials: &mut Trials, width: Width, out: &'a mut [f64]) -> Result<Self, NoMemory> {
+    pub(super) fn new(
+        trials: &mut Trials,
+        width: Width,
+        column: Option<usize>,
+        out: &'a mut [f64],
+    ) -> Result<Self, NoMemory> {
+        let instants = trials.policy.game().grid().steps() + 1;
+        let course = column.map(|column| Course { column, instants });
         let n = trials.shape.size - 1;
         let (blocks, rows) = (trials.blocks.far.len(), columns(n) + n + 1);
         let (mut radii, mut kept) = (Vec::new(), Vec::new());
@@ -75,7 +90,7 @@ impl<'a> Scores<'a> {
         }
         // Nobody is within −1, so no sweep stops for a game that is over.
         trials.blocks.capture.fill([-1.0; BLOCK]);
-        Ok(Self { width, n, radii, kept, over: vec![0; blocks], diverged: vec![0; blocks], out })
+        Ok(Self { width, n, radii, kept, over: vec![0; blocks], diverged: vec![0; blocks], out, course })
     }
 
     /// Takes in the state at t_k, ends what is over there, and takes out those whose numbers end.
@@ -93,12 +108,13 @@ impl<'a> Scores<'a> {
                 gone |= u32::from(!self.diverge(trials, block * BLOCK + l, ends)) << l;
             }
             self.take_in(block, &now);
+            self.follow(trials, block, k);
             // Where the numbers end nobody is caught any more.
             for l in members(caught & playing & !gone & !self.over[block]) {
                 self.end(trials, block * BLOCK + l, k, ends);
             }
             for l in members(gone).rev() {
-                self.remove(trials, block * BLOCK + l);
+                self.remove(trials, block * BLOCK + l, k);
             }
         }
         trials.fill_up();
@@ -143,8 +159,23 @@ impl<'a> Scores<'a> {
         }
     }
 
-    /// Writes the scores of one place out.
-    fn write(&mut self, trials: &Trials, place: usize) {
+    /// Writes out what the score that is followed is at t_k.
+    fn follow(&mut self, trials: &Trials, block: usize, k: usize) {
+        let Some(Course { column, instants }) = self.course else { return };
+        let row = &self.kept[block * self.rows() + column];
+        for l in members(playing(trials.blocks.live, block)) {
+            self.out[trials.who[block * BLOCK + l] as usize * instants + k] = row[l];
+        }
+    }
+
+    /// Writes the scores of one place out, which t_k was the last instant of.
+    fn write(&mut self, trials: &Trials, place: usize, k: usize) {
+        if let Some(Course { instants, .. }) = self.course {
+            let course = &mut self.out[trials.who[place] as usize * instants..][k..instants];
+            let (now, later) = course.split_at_mut(1);
+            later.fill(now[0]);
+            return;
+        }
         let count = columns(self.n);
         let from = &self.kept[place / BLOCK * self.rows()..];
         let out = &mut self.out[trials.who[place] as usize * count..][..count];
@@ -152,8 +183,8 @@ impl<'a> Scores<'a> {
     }
 
     /// Takes the trial in one place out; the last one moves in.
-    fn remove(&mut self, trials: &mut Trials, place: usize) {
-        self.write(trials, place);
+    fn remove(&mut self, trials: &mut Trials, place: usize, k: usize) {
+        self.write(trials, place, k);
         trials.remove(place);
         let last = trials.blocks.live;
         for (all, rows) in [(&mut self.radii, self.n + 1), (&mut self.kept, columns(self.n) + self.n + 1)] {
@@ -171,7 +202,7 @@ impl<'a> Scores<'a> {
     pub(super) fn finish(mut self, trials: &mut Trials, last: usize, ends: &mut [End]) {
         self.look(trials, last, ends);
         for place in 0..trials.blocks.live {
-            self.write(trials, place);
+            self.write(trials, place, last);
         }
         for end in ends.iter_mut().filter(|end| end.outcome == Outcome::Timeout) {
             end.step = last;
