@@ -13,7 +13,7 @@ from tadcore import scenarios
 from tadcore.errors import ScenarioError, TadcoreError
 from tadcore.scenario.model import Scenario
 
-from .keys import ARROWS, Keys
+from .keys import ARROWS, Keys, leave
 from .model import Explorer
 from .page import Page
 
@@ -43,6 +43,7 @@ class Desk:
         )  # fmt: skip
         self.file = FileInput(accept=".toml", title="or a file (.toml)", width=230, name="file")
         self.keys = Keys([*ARROWS, "n", " "], lambda key, shift: self.page.press(key, shift))
+        self.names.js_on_change("value", leave())
         self.names.on_change("value", lambda attribute, old, new: self._named(str(new)))
         self.file.on_change("value", lambda attribute, old, new: self._sent())
         self.document: Document | None = None

@@ -19,8 +19,22 @@ HELP = (
     "plays and pauses."
 )
 
+_LEAVE = """
+if (window.tadcore_pointed) {
+  let at = document.activeElement;
+  while (at?.shadowRoot?.activeElement) at = at.shadowRoot.activeElement;
+  at?.blur();
+}
+"""
 _LISTEN = """
 let n = 0;
+document.addEventListener('pointerdown', () => { window.tadcore_pointed = true; }, true);
+document.addEventListener('keydown', () => { window.tadcore_pointed = false; }, true);
+document.addEventListener('pointerup', () => setTimeout(() => {
+  let at = document.activeElement;
+  while (at?.shadowRoot?.activeElement) at = at.shadowRoot.activeElement;
+  if (window.tadcore_pointed && at?.matches('button, .noUi-handle')) at.blur();
+}), true);
 document.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !known.includes(event.key)) return;
   const at = event.composedPath()[0];
@@ -32,6 +46,11 @@ document.addEventListener('keydown', (event) => {
   source.data = {key: [event.key], shift: [event.shiftKey], n: [n++]};
 });
 """
+
+
+def leave() -> CustomJS:
+    """What takes the focus, and with it the keys, from whatever the pointer has just changed; the keyboard keeps it."""
+    return CustomJS(code=_LEAVE)
 
 
 class Keys:

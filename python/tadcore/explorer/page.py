@@ -27,7 +27,7 @@ from tadcore.errors import TadcoreError
 from .backdrop import Backdrop
 from .feed import Feed
 from .figures import HISTORY, PLANE, arena, controls, plain, theta, timeline
-from .keys import ARROWS, HELP, STEP, STRIDE
+from .keys import ARROWS, HELP, STEP, STRIDE, leave
 from .model import Explorer
 from .playback import Playback
 from .pointer import Pointer
@@ -220,6 +220,7 @@ class Page:
         self.time.on_change("value", lambda attribute, old, new: self._scrub(new))
         self.planes.on_change("active", lambda attribute, old, new: self._project(self.planes.labels[new]))
         self.traces.on_change("active", lambda attribute, old, new: self._trace(new - 1))
+        self.chosen.js_on_change("value", leave())
         self.chosen.on_change("value", lambda attribute, old, new: self._choose(new))
         self.trial.on_change("value", lambda attribute, old, new: self._draw(int(new)))
 

@@ -428,6 +428,18 @@ def test_keys_maps_files_and_narrow_windows_in_a_real_browser(address, tmp_path)
         view.wait_for_function(f"!{time}")
         view.get_by_text("outcome map", exact=True).click()
         read(view, "map", r"^by the start of d1: .*by d\d$")
+        view.keyboard.press(" ")  # what was clicked does not keep the space bar
+        view.wait_for_function(time)
+        view.keyboard.press(" ")
+        chooser = view.locator("select").nth(1)
+        chooser.click()
+        chooser.select_option("d3")  # nor does a list keep the arrows
+        view.keyboard.press("ArrowUp")
+        moved = {"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05), "d3.position": (-1.0, 0.05)}
+        read(view, "status", f"^<b>{tadcore.simulate(start.replace(moved)).outcome}</b>$")
+        chooser.focus()
+        view.keyboard.press("Home")  # but with the keyboard it does
+        read(view, "map", r"^by the start of d1: ")
         view.get_by_text("certified map", exact=True).click()
         read(view, "map", r"proved: \d+\.\d % of the area so far$")
         view.get_by_text("certified map", exact=True).click()
