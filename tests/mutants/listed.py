@@ -29,6 +29,6 @@ EQUIVALENT = {
         "registers: empty unknowns, first",
     ): "every tile holds an unknown, the first one",
     ("synthesis/newton/factor_one.rs", "registers: eight rows"): "two tiles one after the other give the same bits",
-    ("cost/mod.rs", "J: Horner"): "it reverses z from one end of a step to the other, and costs are quadratic in z",
+    ("cost/quadrature.rs", "J: Horner"): "it turns z around, and costs are quadratic in z",
     ("network/sight.rs", "rounded root, down"): "the next loop climbs back to the same number",
 }

@@ -218,12 +218,12 @@ fn players_move_by_their_velocities() {
 }
 
 /// J along a run from its recorded states alone, by the corrected trapezoid rule: with the slopes ℓ' of the integrand at
-/// both ends of a step, ∫ℓ = δ/2 (ℓ₀ + ℓ₁) + δ²/12 (ℓ₀' − ℓ₁') + O(δ⁵). No exponential and no series is in it; the
-/// free players' feedback is written out from P.
-fn costs_by_trapezoids(policy: &Policy, record: &Record) -> Vec<f64> {
+/// both ends of a step, ∫ℓ = δ/2 (ℓ₀ + ℓ₁) + δ²/12 (ℓ₀' − ℓ₁') + O(δ⁵). A coarse step is cut into many `parts`, which the
+/// classical Runge–Kutta method follows. No exponential is in it; the free players' feedback is written out from P.
+fn costs_by_trapezoids(policy: &Policy, record: &Record, parts: usize) -> Vec<f64> {
     type Plane = [f64; 2];
     let (game, equilibrium) = (policy.game(), policy.equilibrium());
-    let (w, size, step) = (game.weights(), game.size(), game.grid().step());
+    let (w, size, step) = (game.weights(), game.size(), game.grid().step() / parts as f64);
     let relative = |k: usize| -> Vec<Plane> {
         let row = &record.positions[k * 2 * (size + 1)..(k + 1) * 2 * (size + 1)];
         let attacker = [row[2 * size], row[2 * size + 1]];
@@ -266,9 +266,29 @@ fn costs_by_trapezoids(policy: &Policy, record: &Record) -> Vec<f64> {
                 .map(|(s, j)| [s[0] + values[j], s[1] + slopes[j]])
                 .collect()
         };
-        let ends = (integrands(&relative(k)), integrands(&relative(k + 1)));
-        for (total, (from, to)) in total.iter_mut().zip(ends.0.into_iter().zip(ends.1)) {
-            *total += 0.5 * (step / 2.0 * (from[0] + to[0]) + step * step / 12.0 * (from[1] - to[1]));
+        let slope = |z: &[Plane]| -> Vec<Plane> {
+            let own = times(&rows[size], z);
+            rows[..size].iter().map(|row| times(row, z)).map(|u| [u[0] - own[0], u[1] - own[1]]).collect()
+        };
+        let ahead = |z: &[Plane], by: f64, slope: &[Plane]| -> Vec<Plane> {
+            z.iter().zip(slope).map(|(z, s)| [z[0] + by * s[0], z[1] + by * s[1]]).collect()
+        };
+        let mut z = relative(k);
+        for part in 1..=parts {
+            let from = integrands(&z);
+            z = if part == parts {
+                relative(k + 1)
+            } else {
+                let a = slope(&z);
+                let b = slope(&ahead(&z, 0.5 * step, &a));
+                let c = slope(&ahead(&z, 0.5 * step, &b));
+                let d = slope(&ahead(&z, step, &c));
+                let sum = ahead(&ahead(&ahead(&a, 2.0, &b), 2.0, &c), 1.0, &d);
+                ahead(&z, step / 6.0, &sum)
+            };
+            for (total, (from, to)) in total.iter_mut().zip(from.into_iter().zip(integrands(&z))) {
+                *total += 0.5 * (step / 2.0 * (from[0] + to[0]) + step * step / 12.0 * (from[1] - to[1]));
+            }
         }
     }
     let z = relative(record.steps);
@@ -285,11 +305,35 @@ fn costs_are_the_integrals_over_the_recorded_states() {
     {
         let policy = paper(interaction, 1.0);
         let record = run(&policy, &start);
-        let (computed, expected) =
-            (cost::costs(&policy, &record, &CancelToken::new()).expect("costs"), costs_by_trapezoids(&policy, &record));
+        let (computed, expected) = (
+            cost::costs(&policy, &record, &CancelToken::new()).expect("costs"),
+            costs_by_trapezoids(&policy, &record, 1),
+        );
         assert_eq!(computed.len(), expected.len());
         for (a, b) in computed.iter().zip(&expected) {
             assert!((a - b).abs() < 1e-8 * b.abs().max(1.0), "{interaction:?}: {a} and {b}");
+        }
+    }
+}
+
+/// Coarse steps, in which ‖C‖δ lies between 0.2 and 50: most are stiff, and some are not.
+#[test]
+fn costs_of_coarse_steps_are_the_integrals_over_the_motion() {
+    for (interaction, start) in
+        [(Interaction::I1, bank::paper_i1_limited()), (Interaction::I2, bank::paper_i2_limited())]
+    {
+        for (r_d, horizon, step) in
+            [(vec![1.0; 3], 3.0, 0.25), (vec![1.0, 0.02, 1.0], 0.9, 0.1), (vec![4.0; 3], 0.5, 0.5)]
+        {
+            let game = bank::unit_game(interaction, r_d, 1.2, 0.8, 1.0, horizon, step).expect("valid");
+            let policy = policy(game, DEFAULT_TABLE_BYTES);
+            let record = run(&policy, &start);
+            let computed = cost::costs(&policy, &record, &CancelToken::new()).expect("costs");
+            let expected = costs_by_trapezoids(&policy, &record, 2000);
+            assert_eq!(computed.len(), expected.len());
+            for (a, b) in computed.iter().zip(&expected) {
+                assert!((a - b).abs() < 1e-9 * b.abs().max(1.0), "{interaction:?}, {step}: {a} and {b}");
+            }
         }
     }
 }

@@ -1,12 +1,15 @@
-"""Costs of a run from its recorded gains alone, mode by mode: exact where a step is stiff, too.
+"""Costs of a run from its recorded gains alone, in decimal numbers: exact where a step is stiff, too.
 
-On a step z(t) = Σ c_i v_i exp(λ_i t) with the modes of C, so ∫zᵀMz dt = Σ (c_i v_i)ᵀ M (c_j v_j) φ(λ_i + λ_j) with
-φ(a) = (exp(aδ) - 1) / a. For N = 2 modes and sums are decimal numbers; else doubles, as good as the modes are apart.
+Of a duel mode by mode: on a step z(t) = Σ c_i v_i exp(λ_i t) with the modes of C, so that
+∫zᵀMz dt = Σ (c_i v_i)ᵀ M (c_j v_j) φ(λ_i + λ_j) with φ(a) = (exp(aδ) - 1) / a. Of any team by the Gramian of each cost,
+W(h) = Σ T_j, T_0 = Mh, T_{j+1} = (CᵀT_j + T_jC) h / (j + 2), W(2h) = W(h) + exp(Ch)ᵀ W(h) exp(Ch).
 """
 
-from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
+from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, getcontext, localcontext
 
 import numpy as np
+
+from oracle.decimals import product
 
 
 def players(run):
@@ -81,28 +84,97 @@ def exact_costs(run):
         return {name: float(value) for name, value in total.items()}
 
 
-def modal_costs(run):
-    """J by group and, by group, how far rounding may move it; for any number of defenders."""
+def decimal_costs(run, digits=120):
+    """J by group for any number of defenders; by group, what adds up in doubles.
+
+    That is the sum of the parts of all steps with ‖C‖δ at most a half, each by its size; whole costs where no step is
+    larger, since the terminal part then adds up in doubles, too.
+    """
     sc = run.scenario
-    total, doubt = dict.fromkeys(objectives(sc), 0.0), dict.fromkeys(objectives(sc), 0.0)
-    for k, rows in enumerate(players(run)[:-1]):
-        # a game that ends at a crossing ends within its last step
-        delta = min(sc.horizon / sc.steps, run.times[k + 1] - run.times[k])
-        C = rows[:-1] - rows[-1]
-        modes, V = np.linalg.eig(C)
-        z = run.position[k, :-1] - run.position[k, -1]
-        pieces = np.linalg.solve(V, z.astype(complex))[:, None, :] * V.T[:, :, None]  # (mode, row, axis)
-        rate = modes[:, None] + modes
-        with np.errstate(divide="ignore", invalid="ignore"):
-            phi = np.where(np.abs(rate) * delta < 1e-12, delta, np.expm1(rate * delta) / rate)
-        rounding = 1e-15 * np.linalg.cond(V) * (1.0 + np.abs(C).sum(axis=1).max() * delta)
-        for name, (effort, q, _) in objectives(sc).items():
-            M = rows.T @ np.diag(effort) @ rows + np.diag(q)
-            cross = np.einsum("iax,ab,jbx->ij", pieces, M, pieces)
-            total[name] += 0.5 * float((cross * phi).sum().real)
-            doubt[name] += rounding * float(np.abs(cross * phi).sum())
-    z = run.position[-1, :-1] - run.position[-1, -1]
-    for name, (_, _, f) in objectives(sc).items():
-        total[name] += 0.5 * float(np.asarray(f) @ (z * z).sum(axis=1))
-        doubt[name] += 1e-15 * float(np.abs(f) @ (z * z).sum(axis=1))
-    return total, doubt
+    costs = objectives(sc)
+    with localcontext(Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)):
+        total, added = dict.fromkeys(costs, Decimal(0)), dict.fromkeys(costs, Decimal(0))
+        stiff = False
+        for k, rows in enumerate(players(run)[:-1]):
+            step = Decimal(sc.horizon) / sc.steps
+            if run.times[k + 1] < sc.horizon * (k + 1) / sc.steps * (1 - 1e-12):  # it ends at a crossing
+                step = Decimal(float(run.times[k + 1])) - Decimal(float(run.times[k]))
+            size = np.abs(rows[:-1] - rows[-1]).sum(axis=1).max() * float(step)
+            rows = [[Decimal(float(x)) for x in row] for row in rows]
+            C = [[x - a for x, a in zip(row, rows[-1], strict=True)] for row in rows[:-1]]
+            forms = [(total[name], effort, q) for name, (effort, q, _) in costs.items()]
+            if size <= 0.5:
+                forms += [(added[name], np.abs(effort), np.abs(q)) for name, (effort, q, _) in costs.items()]
+            stiff = stiff or size > 0.5
+            values = running(C, rows, forms, relative(run, k), step)
+            total = dict(zip(costs, values, strict=False))
+            if size <= 0.5:
+                added = dict(zip(costs, values[len(costs) :], strict=True))
+        z = relative(run, len(run.times) - 1)
+        for name, (_, _, f) in costs.items():
+            parts = [Decimal(float(w)) * sum(x * x for x in row) / 2 for w, row in zip(f, z, strict=True)]
+            total[name] += sum(parts)
+            if not stiff:
+                added[name] += sum(map(abs, parts))
+        return {p: float(x) for p, x in total.items()}, {p: float(x) for p, x in added.items()}
+
+
+def relative(run, k):
+    """z of row k of a run, by player and axis."""
+    *team, attacker = [[Decimal(float(x)) for x in row] for row in run.position[k]]
+    return [[x - a for x, a in zip(row, attacker, strict=True)] for row in team]
+
+
+def running(C, rows, forms, z, step):
+    """Each of the forms (sum so far, weights of efforts, weights of states) with its integral over a step added."""
+    N = len(C)
+    size = max(sum(map(abs, line)) for line in [*C, *zip(*C, strict=True)]) * step
+    doublings = 0
+    while size * 2**8 > 1:
+        size, doublings = size / 2, doublings + 1
+    h = step / 2**doublings
+    W = []
+    for _, effort, q in forms:
+        M = [
+            [sum(Decimal(float(r)) * u[i] * u[j] for r, u in zip(effort, rows, strict=True)) for j in range(N)]
+            for i in range(N)
+        ]
+        for i, weight in enumerate(q):
+            M[i][i] += Decimal(float(weight))
+        W.append(series([[x * h for x in row] for row in M], lambda T, j: lyapunov(T, C, h / (j + 1))))
+    E = series([[Decimal(i == j) for j in range(N)] for i in range(N)], lambda T, j: scaled(product(T, C), h / j))
+    for _ in range(doublings):
+        turned = list(zip(*E, strict=True))
+        W = [plus(form, product(turned, product(form, E))) for form in W]
+        E = product(E, E)
+    return [
+        so_far + sum(x * y for a, b in zip(z, product(form, z), strict=True) for x, y in zip(a, b, strict=True)) / 2
+        for (so_far, _, _), form in zip(forms, W, strict=True)
+    ]
+
+
+def series(term, following):
+    """The sum of a term and those that follow, to the digits in use."""
+    total, j, most = term, 0, largest(term)
+    while largest(term) > most * Decimal(10) ** -getcontext().prec:
+        j += 1
+        term = following(term, j)
+        total = plus(total, term)
+    return total
+
+
+def largest(a):
+    return max(abs(x) for row in a for x in row)
+
+
+def plus(a, b):
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def scaled(a, factor):
+    return [[x * factor for x in row] for row in a]
+
+
+def lyapunov(T, C, factor):
+    half = product(T, C)
+    return scaled(plus(half, list(zip(*half, strict=True))), factor)
