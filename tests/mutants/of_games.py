@@ -95,7 +95,11 @@ MUTANTS = {
         ("crossing: the first of two roots", "chord.foot «-» inside.sqrt()", "+"),
         ("crossing: the earlier half first", "self.first(i, reach, «earlier»)", "later"),
         ("crossing: the nearest point of a chord", "p + share * «(q - p)»", "(p - q)"),
+    ],
+    "simulation/motion.rs": [
         ("crossing: growth over two halves", "«half.growth * closed_loop::norm(&half.transition, n).max(1.0)»", "0.0"),
+        ("crossing: which half a kept state is of", "[2 * number, «2 * number + 1»]", "2 * number"),
+        ("crossing: whose kept states", "if «self.kept.begin != start»", "self.kept.begin.is_empty()"),
     ],
     "simulation/passes.rs": [
         ("passes: before the one that ends", "take_while(|entry| «Some(entry.0) != ending»)", "true"),

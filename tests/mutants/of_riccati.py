@@ -154,13 +154,6 @@ MUTANTS = {
         ),
         ("I2: Q h sinhc", "«self.q[ij / n] * *v * h»", "-self.q[ij / n] * *v * h"),
         ("I2: h sinhc S", "for_each(|v| «*v *= h»)", "*v *= -h"),
-        ("I2: Z, its C", "z_row[j] = «c[j * n + i]»;", "-c[j * n + i]"),
-        ("I2: Z, its E P", "«z_row[j] += left * e[k * n + j];»", "z_row[j] -= left * e[k * n + j];"),
-        ("I2: increment, P C", "«g_row[j] += left * c[k * n + j];»", "g_row[j] -= left * c[k * n + j];"),
-        ("I2: increment, Zᵀ P", "«g_row[j] -= left * p[k * n + j];»", "g_row[j] += left * p[k * n + j];"),
-        ("I2: elimination", "«r[j] -= factor * row[j];»", "r[j] += factor * row[j];"),
-        ("I2: elimination, right side", "«g_r[j] -= factor * g_row[j];»", "g_r[j] += factor * g_row[j];"),
-        ("I2: substitution", "«row[j] -= factor * solved[j];»", "row[j] += factor * solved[j];"),
         (
             "I2: bound that no pole is jumped over",
             "«level.bound.0 + norm * level.bound.1»",
@@ -173,16 +166,33 @@ MUTANTS = {
         ),
         ("I2: P S P near a pole", "«-(sum + v[i] * v[j])»", "sum + v[i] * v[j]"),
     ],
+    "riccati/increment.rs": [
+        ("I2: Z, its C", "z_row[j] = «c[j * n + i]»;", "-c[j * n + i]"),
+        ("I2: Z, its E P", "«z_row[j] += left * e[k * n + j];»", "z_row[j] -= left * e[k * n + j];"),
+        ("I2: increment, P C", "«g_row[j] += left * c[k * n + j];»", "g_row[j] -= left * c[k * n + j];"),
+        ("I2: increment, Zᵀ P", "«g_row[j] -= left * p[k * n + j];»", "g_row[j] += left * p[k * n + j];"),
+        ("I2: elimination", "«r[j] -= factor * row[j];»", "r[j] += factor * row[j];"),
+        ("I2: elimination, right side", "«g_r[j] -= factor * g_row[j];»", "g_r[j] += factor * g_row[j];"),
+        ("I2: substitution", "«row[j] -= factor * solved[j];»", "row[j] += factor * solved[j];"),
+    ],
+    "riccati/classes.rs": [
+        ("classes: weights of the others", "(members - 1) as f64 «* of[first]»", "/ of[first]"),
+        ("classes: P within a class", "«p[row + 1] * share[row]»", "p[row + 1]"),
+        ("classes: P of a member itself", "_ if «i == j» => p[row]", "i == j + 1"),
+        ("classes: share of a member", "«1.0 / (members - 1) as f64» } else", "1.0 / members as f64"),
+    ],
     "riccati/escape.rs": [
         ("relative growth", "«cross / square * (b / a)»", "-(cross / square * (b / a))"),
         ("escape inside the horizon", "«rate * s * resolved >= 1.0»", "rate * s * resolved <= 1.0"),
         ("escape at the horizon", "(«s >= horizon» && rate", "s < horizon"),
         ("s* = s + 1 / growth", "let escape_time = «s + rate.recip()»;", "s - rate.recip()"),
     ],
-    "riccati/residual.rs": [
+    "riccati/printed.rs": [
         ("residual of I1", "«q[i] - pa[i] - ap[i] + psp[i]»", "q[i] - pa[i] - ap[i] - psp[i]"),
         ("residual of I2", "«q[i] - psp[i]»", "q[i] + psp[i]"),
         ("residual: S of I2", "«*a - d - tau»", "*a - d + tau"),
+    ],
+    "riccati/residual.rs": [
         ("residual: differences", "«*x += factor * p;»", "*x -= factor * p;"),
         ("residual: fresh integration", ".zip(fresh).map(|(a, b)| «a - b»)", "a + b"),
     ],

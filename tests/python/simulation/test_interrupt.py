@@ -83,7 +83,11 @@ sc = tadcore.Scenario.model_validate({
     "interaction": "I2" if second else "I1", "horizon": horizon, "step": horizon / steps,
     "attacker": {"position": [-1.0, -1.0], "control_weight": 0.8, "capture_radius": 0.001},
     "target": {"position": [1.0, 1.0], "control_weight": 1.2, **({"visibility_radius": zeta} if second else {})},
-    "defenders": [{**defender, "position": p} for p in rng.uniform(0, n**0.5, (n, 2)).tolist()],
+    # Not two alike: P of equal defenders is that of a small game.
+    "defenders": [
+        {**defender, "position": p, "control_weight": 1.0 + 1e-5 * i if what.startswith("equilibrium") else 1.0}
+        for i, p in enumerate(rng.uniform(0, n**0.5, (n, 2)).tolist())
+    ],
 })
 network = tadcore.VisibilityNetwork.from_positions(sc)
 if what not in ("equilibrium", "equilibrium-I2"):

@@ -49,6 +49,9 @@ def test_full_sight_costs_no_synthesis(interaction):
     assert np.allclose(run.gains[0], rows, rtol=1e-14, atol=0)
     assert run.theta[0] <= 1e-20 * np.linalg.norm(rows) ** 4
     assert tadcore.simulate_batch(sc, [sc.positions] * 2)[1] == run.outcome
+    found = tadcore.synthesize(sc, step=0, adjacency=tadcore.VisibilityNetwork.from_positions(sc))
+    assert (found.rows == run.gains[0]).all()
+    assert found.certified_blocks
 
 
 def theta_and_gradient(sc, P, G):
@@ -174,7 +177,8 @@ def test_a_thousand_defenders_are_a_scenario_and_their_grid_is_refused_by_size()
         ("crowd(60, interaction='I2', horizon=0.004, step=4e-6)", "tadcore.simulate(sc)", 24),
         ("crowd(10, horizon=30.0, step=0.0005)", "tadcore.solve_equilibrium(sc).P", 60),
         ("crowd(10, horizon=30.0, step=0.0005)", "tadcore.solve_equilibrium(sc)._core.feedback()", 20),
-        ("crowd(300, horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 40),
+        ("crowd(300, horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 24),
+        ("crowd(300, horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 30),
         ("crowd(300, interaction='I2', horizon=1e-4, step=1e-4)", "tadcore.simulate(sc)", 10),
         ("crowd(40, zeta=3.0)", "tadcore.simulate_batch(sc, np.repeat([sc.positions], 50_000, 0))", 60),
         (  # 40,401 chains for each of 200 trials

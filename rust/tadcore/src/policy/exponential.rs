@@ -7,7 +7,7 @@
 
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
-use crate::memory::{copy, zeros};
+use crate::memory::{copy, spare, zeros};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use nalgebra::{RowSVector, SMatrix};
@@ -91,6 +91,8 @@ fn large(c: &[f64], row: &[f64], step: f64, e: &mut [f64], a: &mut [f64], cancel
     let n = row.len();
     let s = halvings(c, n, step);
     let h = step * 0.5f64.powi(s);
+    // faer takes some megabytes for each thread, by a call that ends the process where there are none.
+    spare(WHAT)?;
     let mut x = copy(WHAT, c)?;
     x.iter_mut().for_each(|v| *v *= h);
     let mut term = zeros(WHAT, n * n)?;

@@ -23,11 +23,12 @@
 //! Source: eq:RDE of the paper, with the sign of time reversed; the bound is ours.
 
 use super::escape;
-use crate::cancel::{CancelToken, raised};
+use super::increment::Level;
+use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, NoMemory, Stopped};
 use crate::game::Game;
 use crate::memory::zeros;
-use crate::simd::{Width, widened};
+use crate::simd::Width;
 
 /// Largest bound on ‖X − I‖ for which a step is taken.
 const BOUND: f64 = 0.5;
@@ -43,18 +44,6 @@ const WHAT: &str = "the solution of the Riccati equation";
 const POLL: usize = 256;
 /// N beyond which it is looked at in every step, and within.
 const SMALL: usize = 8;
-
-/// What a step of one length needs; matrices in rows, N × N.
-struct Level {
-    /// cosh ωh − 1 and sinh(ωh)/ω.
-    bound: (f64, f64),
-    /// C = cosh(√(SQ) h) − I.
-    c: Vec<f64>,
-    /// h sinhc(√(SQ) h) S, symmetric.
-    e: Vec<f64>,
-    /// Q h sinhc(√(SQ) h), symmetric.
-    f: Vec<f64>,
-}
 
 struct Flow {
     n: usize,
@@ -198,114 +187,6 @@ fn symmetrise(n: usize, a: &mut [f64]) {
     }
 }
 
-/// P ← P + (F + Cᵀ P − P Z) X⁻¹; `z` and `g` are scratch, and so are `z_row` and `g_row`, n long: a row that is summed up
-/// stays in registers where n is a constant. Once `cancel` is raised P is left unfinished.
-#[inline(always)]
-fn advance(
-    n: usize,
-    level: &Level,
-    p: &mut [f64],
-    (z, g): (&mut [f64], &mut [f64]),
-    (z_row, g_row): (&mut [f64], &mut [f64]),
-    cancel: Option<&CancelToken>,
-) {
-    let (c, e, f) = (&level.c[..n * n], &level.e[..n * n], &level.f[..n * n]);
-    let (p, z, g) = (&mut p[..n * n], &mut z[..n * n], &mut g[..n * n]);
-    let (z_row, g_row) = (&mut z_row[..n], &mut g_row[..n]);
-    // Zᵀ = Cᵀ + P E in `z`; then Gᵀ = F + P C − Zᵀ P in `g`, so that the increment solves Xᵀ (ΔP)ᵀ = Gᵀ.
-    for i in 0..n {
-        if raised(cancel) {
-            return;
-        }
-        for j in 0..n {
-            z_row[j] = c[j * n + i];
-            g_row[j] = f[i * n + j];
-        }
-        for k in 0..n {
-            let left = p[i * n + k];
-            for j in 0..n {
-                z_row[j] += left * e[k * n + j];
-                g_row[j] += left * c[k * n + j];
-            }
-        }
-        for k in 0..n {
-            let left = z_row[k];
-            for j in 0..n {
-                g_row[j] -= left * p[k * n + j];
-            }
-        }
-        z_row[i] += 1.0;
-        z[i * n..][..n].copy_from_slice(z_row);
-        g[i * n..][..n].copy_from_slice(g_row);
-    }
-    // Elimination without pivoting: ‖Z‖₁ ≤ ½.
-    for k in 0..n {
-        if raised(cancel) {
-            return;
-        }
-        let pivot = 1.0 / z[k * n + k];
-        let (above, below) = z.split_at_mut((k + 1) * n);
-        let (g_above, g_below) = g.split_at_mut((k + 1) * n);
-        let (row, g_row) = (&above[k * n..], &g_above[k * n..]);
-        for (r, g_r) in below.chunks_exact_mut(n).zip(g_below.chunks_exact_mut(n)) {
-            let factor = r[k] * pivot;
-            for j in k + 1..n {
-                r[j] -= factor * row[j];
-            }
-            for j in 0..n {
-                g_r[j] -= factor * g_row[j];
-            }
-        }
-    }
-    for k in (0..n).rev() {
-        if raised(cancel) {
-            return;
-        }
-        let pivot = 1.0 / z[k * n + k];
-        let (above, below) = g.split_at_mut((k + 1) * n);
-        let row = &mut above[k * n..];
-        for (m, solved) in (k + 1..n).zip(below.chunks_exact(n)) {
-            let factor = z[k * n + m];
-            for j in 0..n {
-                row[j] -= factor * solved[j];
-            }
-        }
-        for j in 0..n {
-            row[j] *= pivot;
-        }
-    }
-    for i in 0..n {
-        for j in 0..i {
-            let half = 0.5 * (g[i * n + j] + g[j * n + i]);
-            p[i * n + j] += half;
-            p[j * n + i] += half;
-        }
-        p[i * n + i] += g[i * n + i];
-    }
-}
-
-widened! {
-    #[inline(never)]
-    fn advance_small<V, const N: usize>(level: &Level, p: &mut [f64], z: &mut [f64], g: &mut [f64]) {
-        advance(N, level, p, (z, g), (&mut [0.0; N], &mut [0.0; N]), None);
-    }
-}
-
-widened! {
-    #[inline(never)]
-    fn advance_large<V>(
-        n: usize,
-        level: &Level,
-        p: &mut [f64],
-        z: &mut [f64],
-        g: &mut [f64],
-        cancel: Option<&CancelToken>,
-    ) {
-        let ((z, z_row), (g, g_row)) = (z.split_at_mut(n * n), g.split_at_mut(n * n));
-        advance(n, level, p, (z, g), (z_row, g_row), cancel);
-    }
-}
-
 /// Solves eq:RDE backward over the grid of `game`, writing N × N matrices into `nodes`, one after the other. Returns
 /// the number of steps.
 pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Result<usize, EquilibriumError> {
@@ -340,16 +221,7 @@ pub(super) fn solve(game: &Game, cancel: &CancelToken, nodes: &mut [f64]) -> Res
                 }
             }
             if let Some(level) = &flow.levels[j] {
-                match n {
-                    2 => advance_small::<2>(width, level, &mut p, &mut z, &mut g),
-                    3 => advance_small::<3>(width, level, &mut p, &mut z, &mut g),
-                    4 => advance_small::<4>(width, level, &mut p, &mut z, &mut g),
-                    5 => advance_small::<5>(width, level, &mut p, &mut z, &mut g),
-                    6 => advance_small::<6>(width, level, &mut p, &mut z, &mut g),
-                    7 => advance_small::<7>(width, level, &mut p, &mut z, &mut g),
-                    8 => advance_small::<8>(width, level, &mut p, &mut z, &mut g),
-                    _ => advance_large(width, n, level, &mut p, &mut z, &mut g, Some(cancel)),
-                }
+                level.advance(width, n, &mut p, &mut z, &mut g, cancel);
             }
             taken += 1;
             done += (-(j as f64)).exp2();

@@ -21,29 +21,35 @@
 //!
 //! | room | what it knows |
 //! |---|---|
+//! | `classes` | large teams with equal defenders, as smaller games |
 //! | `coupled`, `large` | I1: the right-hand side for N known to the compiler, and for any N |
 //! | `triangle` | how the matrices of a large game are stored |
 //! | `dop853`, `stages`, `tableau` | the adaptive integrator of order 8, its loops, its coefficients |
 //! | `weight` | the norm of its error |
-//! | `hamiltonian` | I2: exact steps that cannot jump over a pole |
+//! | `hamiltonian`, `increment` | I2: exact steps that cannot jump over a pole, and one of them |
 //! | `escape` | what counts as an escape, and when it happens |
 //! | `condition` | I1: whether weights that lie far apart determine P |
-//! | `residual` | how well a stored solution satisfies the equations as printed |
+//! | `residual`, `printed` | how well a stored solution satisfies the equations as printed; these equations |
 //!
 //! Accuracy: every P_p(t_k) to 1e-10 relative to its own norm, in both interactions, at every node; where weights lie
 //! more than three decades apart, what a change of the weights by a 10⁻¹²th leaves certain, and an error below five digits.
 
+mod classes;
 mod condition;
 mod coupled;
 mod dop853;
 mod escape;
 mod hamiltonian;
+mod increment;
 mod large;
+mod printed;
 mod residual;
 mod stages;
 mod tableau;
 mod triangle;
 mod weight;
+
+use classes::Classes;
 
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, Stopped};
@@ -79,14 +85,25 @@ pub fn solve(game: &Game, cancel: &CancelToken) -> Result<Equilibrium, Equilibri
     let (interaction, size, steps) = (game.interaction(), game.size(), game.grid().steps());
     let mut nodes = zeros("P on the grid", (steps + 1) * groups(interaction) * size * size)?;
     spare("the solution of the Riccati equations")?;
-    let integrator_steps = match interaction {
-        Interaction::I1 => condition::determined(game, &mut nodes, |game, nodes| coupled::solve(game, cancel, nodes))?,
-        Interaction::I2 => hamiltonian::solve(game, cancel, &mut nodes)?,
+    let integrator_steps = match Classes::of(game).and_then(|classes| Some((classes.game(game)?, classes))) {
+        None => fill(game, &mut nodes, cancel)?,
+        Some((small, classes)) => {
+            let mut reduced = classes.room(&nodes, size)?;
+            let integrator_steps = fill(&small, &mut reduced, cancel)?;
+            classes.expand(&reduced, &mut nodes, cancel)?;
+            integrator_steps
+        }
     };
-    if interaction == Interaction::I2 && !finite(&nodes) {
-        return Err(EquilibriumError::Range);
-    }
     Ok(Equilibrium { interaction, size, steps, integrator_steps, nodes })
+}
+
+/// Solves the equations of `game` itself; the steps that it took.
+fn fill(game: &Game, nodes: &mut [f64], cancel: &CancelToken) -> Result<usize, EquilibriumError> {
+    if game.interaction() == Interaction::I1 {
+        return condition::determined(game, nodes, |game, nodes| coupled::solve(game, cancel, nodes));
+    }
+    let steps = hamiltonian::solve(game, cancel, nodes)?;
+    if finite(nodes) { Ok(steps) } else { Err(EquilibriumError::Range) }
 }
 
 /// Whether all numbers are.

@@ -1,7 +1,7 @@
 //! How well a stored solution satisfies the Riccati equations as they are printed.
 //!
 //! Residual at t_k, for each group: ‖Ṗ + Q − PA − AᵀP + P S P‖ / (‖Q‖ + 2‖PA‖ + ‖P S P‖), in I2 ‖Ṗ + Q − P S P‖ /
-//! (‖Q‖ + ‖P S P‖), with dense S_p and A as in the paper: nothing is shared with the solvers. Ṗ is the difference of
+//! (‖Q‖ + ‖P S P‖), with dense S_p and A as in the paper ([`super::printed`]): nothing is shared with the solvers. Ṗ is the difference of
 //! order 8 of nine stored nodes whose distance is about 1/30 of the time scale of the equation; nothing else is known
 //! of how they came about.
 //!
@@ -10,22 +10,15 @@
 //! A grid too coarse for differences is checked step by step: the printed equation is integrated from t_{k+1} to t_k,
 //! and the residual is the mismatch with the stored node, relative to the smaller of ‖P‖ and what a step can change.
 //!
-//! | symbol | name here | meaning |
-//! |---|---|---|
-//! | S_d, S_τ, S_a | `s` | B R⁻¹ Bᵀ, dense; in I2 the one matrix S_a − S_dτ |
-//! | A | `a` | S_d P_d + S_τ P_τ + S_a P_a |
-//! | Q_p | `q` | running weights |
-//!
 //! Source: eq:Riccati and eq:RDE of the paper; Fornberg, *Math. Comp.* 51 (1988), for the differences.
 
 use super::Equilibrium;
-use super::dop853::{self, Flow};
-use super::stages::LANES;
-use super::weight;
+use super::dop853;
+use super::printed::{Textbook, norm};
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
-use crate::game::{Game, Interaction};
-use crate::memory::{reserve, zeros};
+use crate::game::Game;
+use crate::memory::zeros;
 
 /// Nodes of a difference.
 const POINTS: usize = 9;
@@ -40,151 +33,7 @@ const ROUNDING: f64 = 1e-8;
 const TOLERANCE: f64 = 1e-13;
 
 /// What asks for memory here.
-const WHAT: &str = "the residual of the Riccati equations";
-
-/// The printed equations.
-struct Textbook {
-    cancel: CancelToken,
-    n: usize,
-    interaction: Interaction,
-    s: Vec<Vec<f64>>,
-    q: Vec<Vec<f64>>,
-    block: usize,
-}
-
-/// The right-hand side at one node.
-struct Evaluation {
-    /// dP/ds, (group, i, j).
-    derivative: Vec<f64>,
-    /// Norms of its terms, per group.
-    scale: Vec<f64>,
-}
-
-impl Textbook {
-    fn new(game: &Game, cancel: &CancelToken) -> Result<Self, Stopped> {
-        let (n, w) = (game.size(), game.weights());
-        let diagonal = |d: &[f64]| -> Result<Vec<f64>, Stopped> {
-            let mut m = zeros(WHAT, n * n)?;
-            for (i, v) in d.iter().enumerate() {
-                m[i * n + i] = *v;
-            }
-            Ok(m)
-        };
-        let mut inverse: Vec<f64> = w.r_d.iter().map(|r| 1.0 / r).collect();
-        inverse.push(0.0);
-        let s_d = diagonal(&inverse)?;
-        let mut last = vec![0.0; n];
-        last[n - 1] = 1.0 / w.r_tau;
-        let s_tau = diagonal(&last)?;
-        let mut s_a = zeros(WHAT, n * n)?;
-        s_a.fill(1.0 / w.r_a);
-        let s = match game.interaction() {
-            Interaction::I1 => vec![s_d, s_tau, s_a],
-            Interaction::I2 => {
-                s_a.iter_mut().zip(s_d.iter().zip(&s_tau)).for_each(|(a, (d, tau))| *a = *a - d - tau);
-                vec![s_a]
-            }
-        };
-        let q = game.state_weights(false).iter().map(|q| diagonal(q)).collect::<Result<_, Stopped>>()?;
-        Ok(Self {
-            cancel: cancel.clone(),
-            n,
-            interaction: game.interaction(),
-            s,
-            q,
-            block: (n * n).next_multiple_of(LANES),
-        })
-    }
-
-    /// A = Σ S P.
-    fn closed_loop(&self, p: &[&[f64]]) -> Result<Vec<f64>, Stopped> {
-        let mut a = zeros(WHAT, self.n * self.n)?;
-        for (s, p) in self.s.iter().zip(p) {
-            for (a, v) in a.iter_mut().zip(self.multiply(s, p)?) {
-                *a += v;
-            }
-        }
-        Ok(a)
-    }
-
-    fn multiply(&self, a: &[f64], b: &[f64]) -> Result<Vec<f64>, Stopped> {
-        let n = self.n;
-        let mut out = zeros(WHAT, n * n)?;
-        for (row, a) in out.chunks_exact_mut(n).zip(a.chunks_exact(n)) {
-            self.cancel.check()?;
-            for (a, b) in a.iter().zip(b.chunks_exact(n)).filter(|(a, _)| **a != 0.0) {
-                for (o, b) in row.iter_mut().zip(b) {
-                    *o += a * b;
-                }
-            }
-        }
-        Ok(out)
-    }
-
-    fn transpose(&self, a: &[f64]) -> Result<Vec<f64>, Stopped> {
-        let n = self.n;
-        let mut out = zeros(WHAT, n * n)?;
-        out.iter_mut().enumerate().for_each(|(ij, x)| *x = a[(ij % n) * n + ij / n]);
-        Ok(out)
-    }
-
-    /// How fast the equation can change its solution: 2‖A‖ + (‖S‖ ‖Q‖)^½.
-    fn rate(&self, p: &[&[f64]]) -> Result<f64, Stopped> {
-        let largest = |m: &[Vec<f64>]| m.iter().map(|m| norm(m)).fold(0.0, f64::max);
-        Ok(2.0 * norm(&self.closed_loop(p)?) + (largest(&self.s) * largest(&self.q)).sqrt())
-    }
-
-    /// `p`: one N × N matrix per group.
-    fn evaluate(&self, p: &[&[f64]]) -> Result<Evaluation, Stopped> {
-        let n = self.n;
-        let a = self.closed_loop(p)?;
-        let (mut derivative, mut scale) = (Vec::new(), Vec::new());
-        reserve(WHAT, &mut derivative, p.len() * n * n)?;
-        for ((p, s), q) in p.iter().zip(&self.s).zip(&self.q) {
-            let psp = self.multiply(&self.multiply(p, s)?, p)?;
-            match self.interaction {
-                Interaction::I1 => {
-                    let pa = self.multiply(p, &a)?;
-                    let ap = self.multiply(&self.transpose(&a)?, p)?;
-                    derivative.extend((0..n * n).map(|i| q[i] - pa[i] - ap[i] + psp[i]));
-                    scale.push(norm(q) + 2.0 * norm(&pa) + norm(&psp));
-                }
-                Interaction::I2 => {
-                    derivative.extend((0..n * n).map(|i| q[i] - psp[i]));
-                    scale.push(norm(q) + norm(&psp));
-                }
-            }
-        }
-        Ok(Evaluation { derivative, scale })
-    }
-}
-
-impl Flow for Textbook {
-    fn block_len(&self) -> usize {
-        self.block
-    }
-    fn derivative(&mut self, y: &[f64], dy: &mut [f64]) {
-        let len = self.n * self.n;
-        let p: Vec<&[f64]> = y.chunks_exact(self.block).map(|b| &b[..len]).collect();
-        // Without an answer no step is accepted.
-        let Ok(value) = self.evaluate(&p) else { return dy.fill(f64::NAN) };
-        for (out, d) in dy.chunks_exact_mut(self.block).zip(value.derivative.chunks_exact(len)) {
-            for i in 0..self.n {
-                for j in 0..self.n {
-                    out[i * self.n + j] = 0.5 * (d[i * self.n + j] + d[j * self.n + i]);
-                }
-            }
-        }
-    }
-    fn weigh(&mut self, y: &[f64], out: &mut [f64]) {
-        let len = self.n * self.n;
-        weight::whole(&y[..len], self.n, &mut vec![0.0; self.n], &mut out[..len]);
-    }
-}
-
-fn norm(a: &[f64]) -> f64 {
-    a.iter().map(|v| v * v).sum::<f64>().sqrt()
-}
+pub(super) const WHAT: &str = "the residual of the Riccati equations";
 
 /// Weights of the derivative at point `at` of nine equidistant points, for unit distance.
 fn difference(at: usize) -> [f64; POINTS] {

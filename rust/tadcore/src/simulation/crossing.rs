@@ -9,59 +9,23 @@
 //! A part whose chord stays further away than that has no crossing. One that is a chord to rounding is a quadratic
 //! equation. What lies between is halved again, the earlier half first: no crossing is missed, a tangency included.
 //!
-//! | symbol | name here | meaning |
-//! |---|---|---|
-//! | exp(Cw) | [`Level::transition`] | over a part of length w = δ 2⁻ʲ |
-//! | sup ‖exp(Cτ)‖, τ ≤ w | [`Level::growth`] | in the norm of row sums |
-//! | Σ_j \|C_ij\|, C² | `norm`, `square` | what bounds ‖z̈_i‖ |
+//! What is known of the motion on such parts is in [`super::motion`].
 
-use super::state::apply;
-use crate::cancel::CancelToken;
+pub(crate) use super::near::{clear, near};
+
+use super::motion::{LEVELS, Motion, ROUNDING, SHORT};
 use crate::error::Stopped;
-use crate::memory::zeros;
 use crate::network::{squared_distance, squared_norm};
-use crate::policy::closed_loop;
-use crate::policy::exponential::{exponential, multiply};
 
-/// What asks for memory here.
-const WHAT: &str = "the motion within a step";
-/// Halvings of a step at most: 2⁻⁶⁴ of a step is below every rounding of its length.
-const LEVELS: usize = 64;
-/// ‖C‖w up to which e^{‖C‖w} bounds the growth well.
-const SHORT: f64 = 1.0;
-/// A chord is exact where it is off by no more than this part of its ends.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Parts of one step that are looked at for one row: enough for hundreds of turns in one step.
 const PARTS: usize = 1 << 16;
-
-#[derive(Debug)]
-struct Level {
-    transition: Vec<f64>,
-    growth: f64,
-}
-
-/// The motion of all rows of z over one step.
-#[derive(Debug)]
-pub(crate) struct Motion<'a> {
-    c: &'a [f64],
-    size: usize,
-    dim: usize,
-    step: f64,
-    norm: f64,
-    square: Vec<f64>,
-    levels: Vec<Level>,
-    /// Parts that may still be looked at, and whether there were too few: what was found is then not to be relied on.
-    left: usize,
-    lost: bool,
-    /// The rows that bound how a row turns: all, or where these were too many parts, only those that move it.
-    movers: Option<Vec<bool>>,
-    cancel: &'a CancelToken,
-}
 
 /// A part of a step: from z(`from`) over δ 2^−`level`.
 #[derive(Clone, Copy)]
 struct Part<'z> {
     level: usize,
+    /// Among those whose states are kept.
+    number: usize,
     from: f64,
     start: &'z [f64],
     end: &'z [f64],
@@ -82,24 +46,11 @@ struct Chord {
     straight: bool,
 }
 
-impl<'a> Motion<'a> {
-    /// Of ż = C z over `step`, for states of `dim` axes.
-    pub(crate) fn new(
-        c: &'a [f64],
-        size: usize,
-        dim: usize,
-        step: f64,
-        cancel: &'a CancelToken,
-    ) -> Result<Self, Stopped> {
-        let norm = closed_loop::norm(c, size);
-        let mut square = zeros(WHAT, size * size)?;
-        multiply(&mut square, c, c, size, cancel)?;
-        Ok(Self { c, size, dim, step, norm, square, levels: Vec::new(), left: 0, lost: false, movers: None, cancel })
-    }
-
+impl Motion<'_> {
     /// The first s in (0, δ] with ‖z_i(s)‖² ≤ `reach`, from a start outside; `start` and `end` are z(0) and z(δ).
     pub(crate) fn enters(&mut self, i: usize, reach: f64, start: &[f64], end: &[f64]) -> Result<Option<f64>, Stopped> {
-        let whole = Part { level: 0, from: 0.0, start, end };
+        self.begin(start);
+        let whole = Part { level: 0, number: 1, from: 0.0, start, end };
         self.followed(i, |motion| motion.first(i, reach, whole))
     }
 
@@ -108,7 +59,8 @@ impl<'a> Motion<'a> {
         let row = |z: &[f64]| squared_norm(&z[i * self.dim..(i + 1) * self.dim]).sqrt();
         let (before, after) = (row(start), row(end));
         let nearest_end = if after < before { (self.step, after) } else { (0.0, before) };
-        let whole = Part { level: 0, from: 0.0, start, end };
+        self.begin(start);
+        let whole = Part { level: 0, number: 1, from: 0.0, start, end };
         self.followed(i, |motion| {
             let mut best = nearest_end;
             motion.nearer(i, whole, &mut best)?;
@@ -130,67 +82,9 @@ impl<'a> Motion<'a> {
         Ok(found)
     }
 
-    /// The rows that the motion of row i depends on, itself among them.
-    fn movers_of(&self, i: usize) -> Vec<bool> {
-        let (mut movers, mut next) = (vec![false; self.size], vec![i]);
-        movers[i] = true;
-        while let Some(row) = next.pop() {
-            for (j, &c) in self.c[row * self.size..(row + 1) * self.size].iter().enumerate() {
-                if c != 0.0 && !movers[j] {
-                    movers[j] = true;
-                    next.push(j);
-                }
-            }
-        }
-        movers
-    }
-
     /// Whether the motion turned too often for some row to be followed.
     pub(crate) fn lost(&self) -> bool {
         self.lost
-    }
-
-    /// z(s), and what h ∫₀ˢ exp(Cτ) dτ z(0) adds to the position of the player whose feedback is `row`.
-    pub(crate) fn at(&self, s: f64, row: &[f64], start: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Stopped> {
-        let (mut e, mut a) = (zeros(WHAT, self.size * self.size)?, vec![0.0; self.size]);
-        exponential(self.c, row, s, &mut e, &mut a, self.cancel)?;
-        let mut moved = vec![0.0; self.dim];
-        apply(&a, start, self.dim, &mut moved);
-        Ok((self.moved(&e, start), moved))
-    }
-
-    fn moved(&self, transition: &[f64], z: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; z.len()];
-        for (row, out) in transition.chunks_exact(self.size).zip(out.chunks_exact_mut(self.dim)) {
-            apply(row, z, self.dim, out);
-        }
-        out
-    }
-
-    fn width(&self, level: usize) -> f64 {
-        self.step * 0.5_f64.powi(level as i32)
-    }
-
-    /// The level that halves a step `j` times; those before it first.
-    fn level(&mut self, j: usize) -> Result<&Level, Stopped> {
-        while self.levels.len() <= j {
-            let level = self.levels.len();
-            let mut transition = zeros(WHAT, self.size * self.size)?;
-            let mut unused = vec![0.0; self.size];
-            exponential(self.c, &vec![0.0; self.size], self.width(level), &mut transition, &mut unused, self.cancel)?;
-            self.levels.push(Level { transition, growth: f64::NAN });
-        }
-        if self.levels[j].growth.is_nan() {
-            let (size, n) = (self.norm * self.width(j), self.size);
-            self.levels[j].growth = if size <= SHORT || j >= LEVELS {
-                size.exp()
-            } else {
-                // Over two halves: what one of them can do, once more.
-                let half = self.level(j + 1)?;
-                half.growth * closed_loop::norm(&half.transition, n).max(1.0)
-            };
-        }
-        Ok(&self.levels[j])
     }
 
     fn chord(&mut self, i: usize, part: Part) -> Result<Chord, Stopped> {
@@ -204,7 +98,7 @@ impl<'a> Motion<'a> {
         let share = foot.clamp(0.0, 1.0);
         let at =
             |share: f64| -> f64 { length(&p.iter().zip(q).map(|(p, q)| p + share * (q - p)).collect::<Vec<f64>>()) };
-        let turning = self.moved(&self.square, part.start);
+        let turning = self.turning(part.number, part.start);
         let farthest = part.start.chunks_exact(dim).map(length).fold(0.0, f64::max);
         let counts = |j: usize| self.movers.as_ref().is_none_or(|movers| movers[j]);
         let rows = turning.chunks_exact(dim).enumerate().filter(|&(j, _)| counts(j));
@@ -228,10 +122,11 @@ impl<'a> Motion<'a> {
 
     fn halves<'z>(&mut self, part: Part<'z>, middle: &'z mut Vec<f64>) -> Result<[Part<'z>; 2], Stopped> {
         let level = part.level + 1;
-        self.level(level)?;
-        *middle = self.moved(&self.levels[level].transition, part.start);
+        *middle = self.middle(part.number, level, part.start)?;
         let from = part.from + self.width(level);
-        Ok([Part { level, end: middle, ..part }, Part { level, from, start: middle, end: part.end }])
+        let [earlier, number] = Self::numbers(part.number);
+        let later = Part { level, number, from, start: middle, end: part.end };
+        Ok([Part { level, number: earlier, end: middle, ..part }, later])
     }
 
     fn first(&mut self, i: usize, reach: f64, part: Part) -> Result<Option<f64>, Stopped> {
@@ -291,49 +186,10 @@ fn length(v: &[f64]) -> f64 {
     if most > 0.0 { most * v.iter().map(|x| (x / most) * (x / most)).sum::<f64>().sqrt() } else { 0.0 }
 }
 
-/// By how much, relative to the farthest row, any row may leave its chord over a step with ‖C‖δ = `size`.
-pub(crate) fn clear(size: f64) -> f64 {
-    0.125 * size * size * size.exp() * (1.0 + 1e-9) + ROUNDING
-}
-
-/// Of trials side by side, a bit for each in which some row may enter its radius: `start` and `end` hold row j on axis x
-/// at j·dim + x, `capture` the squared radii, and `stretch` is [`clear`]'s. A bit too many costs time, none is missing.
-pub(crate) fn near<const L: usize>(
-    start: &[[f64; L]],
-    end: &[[f64; L]],
-    capture: &[[f64; L]],
-    dim: usize,
-    stretch: f64,
-) -> u32 {
-    let (mut farthest, mut near) = ([0.0_f64; L], [false; L]);
-    for row in start.chunks_exact(dim) {
-        for l in 0..L {
-            farthest[l] = farthest[l].max(row.iter().map(|x| x[l] * x[l]).sum());
-        }
-    }
-    let off = farthest.map(|square| stretch * square.sqrt());
-    for ((p, q), reach) in start.chunks_exact(dim).zip(end.chunks_exact(dim)).zip(capture) {
-        for l in 0..L {
-            let (mut squared, mut along) = (0.0, 0.0);
-            for (p, q) in p.iter().zip(q) {
-                let d = p[l] - q[l];
-                squared += d * d;
-                along += p[l] * d;
-            }
-            let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
-            let nearest: f64 = p.iter().zip(q).map(|(p, q)| p[l] + share * (q[l] - p[l])).map(|x| x * x).sum();
-            let limit = reach[l].sqrt() + off[l];
-            // What is no number is looked at.
-            let clear = nearest > limit * limit * (1.0 + 1e-9);
-            near[l] |= !clear;
-        }
-    }
-    near.iter().enumerate().fold(0, |bits, (l, &near)| bits | u32::from(near) << l)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancel::CancelToken;
 
     /// Two rows that turn into one another: the first is on the ellipse (a cos ωs, −b sin ωs).
     fn ellipse(omega: f64, a: f64, b: f64, step: f64, test: impl Fn(&mut Motion, &[f64], &[f64])) {
@@ -423,6 +279,20 @@ mod tests {
             assert!((at * rate - std::f64::consts::LN_2).abs() < 1e-6, "λ = {rate}: {at}");
             assert!((nearest - 0.005).abs() < 1e-14);
             assert_eq!(motion.enters(0, 0.0049 * 0.0049, &start, &end), Ok(None));
+        }
+    }
+
+    /// One motion from one start after another: what is kept of the first is not taken for the second.
+    #[test]
+    fn every_start_is_followed_by_itself() {
+        let (c, none) = ([0.0, -1.0, 1.0, 0.0], CancelToken::new());
+        let turned =
+            |z: [f64; 2]| [z[0] * 2.5_f64.cos() - z[1] * 2.5_f64.sin(), z[0] * 2.5_f64.sin() + z[1] * 2.5_f64.cos()];
+        let mut motion = Motion::new(&c, 2, 1, 2.5, &none).expect("memory");
+        for start in [[1.0, 0.0], [1.0, 0.9]] {
+            let alone = Motion::new(&c, 2, 1, 2.5, &none).expect("memory").enters(0, 0.01, &start, &turned(start));
+            assert_eq!(motion.enters(0, 0.01, &start, &turned(start)), alone);
+            assert!(matches!(alone, Ok(Some(_))));
         }
     }
 }

@@ -15,6 +15,8 @@ mod course;
 pub(crate) mod crossing;
 mod disturbance;
 pub mod divergence;
+mod motion;
+mod near;
 mod outcome;
 pub(crate) mod passes;
 mod record;

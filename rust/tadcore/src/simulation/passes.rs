@@ -3,7 +3,8 @@
 //! The sampled game ends at an instant at which somebody is within a radius. Whoever runs through a ball between two
 //! instants is recorded as a [`Pass`]; with [`Termination::Continuous`] the game ends there, at the crossing itself.
 
-use super::crossing::{Motion, clear};
+use super::motion::Motion;
+use super::near::{clear, near};
 use super::outcome::{Outcome, Reach};
 use crate::cancel::CancelToken;
 use crate::error::RunError;
@@ -95,7 +96,7 @@ impl Step<'_> {
     fn may_enter(&self, reach: &Reach, stretch: f64) -> bool {
         let lanes = |z: &[f64]| -> Vec<[f64; 1]> { z.iter().map(|&x| [x]).collect() };
         let capture: Vec<[f64; 1]> = (0..self.start.len() / self.dim).map(|i| [reach.squared(i)]).collect();
-        super::crossing::near(&lanes(self.start), &lanes(self.end), &capture, self.dim, stretch) != 0
+        near(&lanes(self.start), &lanes(self.end), &capture, self.dim, stretch) != 0
     }
 
     /// The passes of the step: every radius that is entered before the one that ends the game at t_{k+1}, if one does.
