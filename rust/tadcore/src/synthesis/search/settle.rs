@@ -27,11 +27,11 @@ const LOST_BY_ROUNDING: f64 = 1e-14;
 const STEPS: usize = 50;
 
 /// Where one way from a search to γ's own weights ended.
-struct End {
-    start: Start,
-    g: Vec<f64>,
-    reached: Reached,
-    certified: bool,
+pub(super) struct End {
+    pub start: Start,
+    pub g: Vec<f64>,
+    pub reached: Reached,
+    pub certified: bool,
 }
 
 impl Search<'_> {
@@ -74,7 +74,8 @@ impl Search<'_> {
                 problem.nearer(players, &mut other.g);
                 // The larger weights shorten the way; where they lead to another minimum the smallest alone may not.
                 for first in [0, thetas.len() - 1, thetas.len()] {
-                    ends.push(self.lower(candidate, other, &thetas[first..])?);
+                    let way = thetas[first..].iter().map(|(weight, theta)| (*weight, theta)).collect();
+                    ends.push(self.lower(candidate, other, way)?);
                 }
             }
         }
@@ -98,16 +99,16 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// From the end of another search along `thetas`, and last by Θ itself.
-    fn lower(
+    /// From the end of another search along `thetas`, each with its weight, and last by Θ itself.
+    pub(super) fn lower(
         &mut self,
         candidate: &mut Candidate,
         from: &Candidate,
-        thetas: &[(f64, Precisions)],
+        thetas: Vec<(f64, &Precisions)>,
     ) -> Result<End, Stopped> {
         let mut end = End { start: from.start, g: from.g.clone(), reached: Reached::default(), certified: false };
         let last = (0.0, &self.problem.theta);
-        for (weight, theta) in thetas.iter().map(|(weight, theta)| (*weight, theta)).chain([last]) {
+        for (weight, theta) in thetas.into_iter().chain([last]) {
             let limits =
                 if weight < LAST { Limits { iterations: STEPS, tolerance: 0.0, ..self.limits } } else { self.limits };
             self.begin(1);

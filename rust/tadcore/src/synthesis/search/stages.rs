@@ -68,7 +68,8 @@ impl Search<'_> {
         }
         let faint = self.problem.faint();
         if faint.is_empty() {
-            return self.everywhere(candidates);
+            self.everywhere(candidates)?;
+            return self.search_heavier(candidates);
         }
         self.settle(candidates, &faint)?;
         // Where S has no weight at all, what is flat stays so.
@@ -170,7 +171,7 @@ impl Search<'_> {
 
     /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
     /// long as the gradient falls.
-    fn polish(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
+    pub(super) fn polish(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         self.begin(1);
         for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| !candidate.quick) {
             self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidate.g);
