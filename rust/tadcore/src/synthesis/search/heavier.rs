@@ -5,7 +5,8 @@
 //! heavier weights beside γ₁ the floors are no longer flat, and the search finds the dip that is the lowest there. From
 //! its end the weights are lowered by a factor of [`STEP`] at a time, each a few steps of Newton's method from the last.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, Start};
+use super::fits::fits;
 use super::stages::Search;
 use crate::error::Stopped;
 use crate::synthesis::newton::Reached;
@@ -33,6 +34,7 @@ impl Search<'_> {
         }
         factors.reverse();
         let thetas: Vec<Precisions> = factors.iter().map(|&factor| problem.heavier(factor)).collect();
+        let mut lower = false;
         let heaviest = problem.with(thetas[0].clone());
         let mut others = open.iter().map(|&e| candidates[e].again()).collect::<Result<Vec<_>, _>>()?;
         let mut search = Search {
@@ -44,16 +46,31 @@ impl Search<'_> {
             workspace: &mut *self.workspace,
         };
         search.everywhere(&mut others)?;
-        let mut lower = false;
         for (&e, other) in open.iter().zip(&others) {
-            let candidate = &mut candidates[e];
-            candidate.iterations += other.iterations;
-            let end = self.lower(candidate, other, thetas[1..].iter().map(|theta| (1.0, theta)).collect())?;
-            if candidate.offer(end.start, &end.g, Reached { iterations: 0, ..end.reached }) {
-                candidate.certified = end.certified;
-                lower = true;
+            candidates[e].iterations += other.iterations;
+            let best = candidates[e].again_at()?;
+            for (from, first) in std::iter::once((other, 1)).chain((0..thetas.len()).map(|first| (&best, first))) {
+                let candidate = &mut candidates[e];
+                let way = thetas[first..].iter().map(|theta| (1.0, theta)).collect();
+                let end = self.lower(candidate, from, way)?;
+                if candidate.offer(end.start, &end.g, Reached { iterations: 0, ..end.reached }) {
+                    candidate.certified = end.certified;
+                    lower = true;
+                }
             }
         }
+        self.begin(1);
+        for &e in &open {
+            for start in fits(problem, &candidates[e]) {
+                let point = self.tasks.add(e, false, 0.0)?;
+                point.copy_from_slice(&start);
+                candidates[e].in_double(point);
+            }
+        }
+        let starts = vec![Start::Reversed; self.tasks.len()];
+        let fitted = self.finish(candidates, starts)?;
+        self.certify(candidates, &fitted)?;
+        lower |= !fitted.is_empty();
         if lower {
             self.polish(candidates)?;
             self.refine(candidates)?;

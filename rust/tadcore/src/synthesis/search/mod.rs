@@ -37,11 +37,13 @@
 //! | `stages` | the stages above |
 //! | `large` | the same for large games |
 //! | `refine` | the end of the search where players differ by decades |
+//! | `fits` | starts that fit GᵀRG to M player by player |
 //! | `heavier` | a second search where γ₁ dominates |
 //! | `settle` | the search where S has next to no weight, and which of equal minima is taken where it has none |
 
 mod blocks;
 mod candidate;
+mod fits;
 mod gradient;
 mod heavier;
 mod large;

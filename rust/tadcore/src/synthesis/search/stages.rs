@@ -281,7 +281,11 @@ impl Search<'_> {
     }
 
     /// Makes the listed descents and keeps what is lower; which candidates that changed.
-    fn finish(&mut self, candidates: &mut [Candidate], mut starts: Vec<Start>) -> Result<Vec<usize>, Stopped> {
+    pub(super) fn finish(
+        &mut self,
+        candidates: &mut [Candidate],
+        mut starts: Vec<Start>,
+    ) -> Result<Vec<usize>, Stopped> {
         if dispatch::single(&self.problem.theta) {
             self.screen(candidates, &mut starts)?;
         }
