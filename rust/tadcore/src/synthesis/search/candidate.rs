@@ -80,13 +80,6 @@ impl Candidate {
         Self::new(self.variables.clone(), copy("the gains of one network", &self.initial)?, self.size, self.complete)
     }
 
-    /// The same at the best point.
-    pub(crate) fn again_at(&self) -> Result<Self, NoMemory> {
-        let mut other = self.again()?;
-        other.g.copy_from_slice(&self.g);
-        Ok(other)
-    }
-
     /// Notes, after the first descent, whether later ones may end early.
     pub(crate) fn note_quick(&mut self) {
         self.quick = self.iterations <= QUICK;

@@ -1,9 +1,10 @@
-//! Where γ₁ dominates: another search with the other weights heavier, lowered to γ's own.
+//! Where γ₁ dominates: another search with the other weights heavier, lowered to γ's own, and starts that fit GᵀRG to M.
 //!
 //! With γ₁ far above the others Θ has valleys, on whose floors ‖GᵀRG − M‖ stays next to nothing while a row of √R·G
 //! turns into that of another player. Descents come down to a floor anywhere and follow it to the nearest dip. With
 //! heavier weights beside γ₁ the floors are no longer flat, and the search finds the dip that is the lowest there. From
-//! its end the weights are lowered by a factor of [`STEP`] at a time, each a few steps of Newton's method from the last.
+//! its end the weights are lowered by a factor of [`STEP`] at a time, each a few steps of Newton's method from the
+//! last. Then descents begin at the starts of [`fits`].
 
 use super::candidate::{Candidate, Start};
 use super::fits::fits;
@@ -19,7 +20,7 @@ const MOST: f64 = 1024.0;
 const STEP: f64 = 4.0;
 
 impl Search<'_> {
-    /// A second search for the candidates that are not certified, where γ₁ dominates.
+    /// More for the candidates that are not certified, where γ₁ dominates.
     pub(super) fn search_heavier(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         let problem = self.problem;
         let ratio = problem.dominance();
@@ -34,7 +35,7 @@ impl Search<'_> {
         }
         factors.reverse();
         let thetas: Vec<Precisions> = factors.iter().map(|&factor| problem.heavier(factor)).collect();
-        let mut lower = false;
+        let mut lower = Vec::new();
         let heaviest = problem.with(thetas[0].clone());
         let mut others = open.iter().map(|&e| candidates[e].again()).collect::<Result<Vec<_>, _>>()?;
         let mut search = Search {
@@ -47,16 +48,12 @@ impl Search<'_> {
         };
         search.everywhere(&mut others)?;
         for (&e, other) in open.iter().zip(&others) {
-            candidates[e].iterations += other.iterations;
-            let best = candidates[e].again_at()?;
-            for (from, first) in std::iter::once((other, 1)).chain((0..thetas.len()).map(|first| (&best, first))) {
-                let candidate = &mut candidates[e];
-                let way = thetas[first..].iter().map(|theta| (1.0, theta)).collect();
-                let end = self.lower(candidate, from, way)?;
-                if candidate.offer(end.start, &end.g, Reached { iterations: 0, ..end.reached }) {
-                    candidate.certified = end.certified;
-                    lower = true;
-                }
+            let candidate = &mut candidates[e];
+            candidate.iterations += other.iterations;
+            let end = self.lower(candidate, other, thetas[1..].iter().map(|theta| (1.0, theta)).collect())?;
+            if candidate.offer(end.start, &end.g, Reached { iterations: 0, ..end.reached }) {
+                candidate.certified = end.certified;
+                lower.push(e);
             }
         }
         self.begin(1);
@@ -70,10 +67,14 @@ impl Search<'_> {
         let starts = vec![Start::Reversed; self.tasks.len()];
         let fitted = self.finish(candidates, starts)?;
         self.certify(candidates, &fitted)?;
-        lower |= !fitted.is_empty();
-        if lower {
-            self.polish(candidates)?;
-            self.refine(candidates)?;
+        lower.extend(fitted);
+        lower.sort_unstable();
+        lower.dedup();
+        // One by one: the others stay as they are.
+        for e in lower {
+            let candidate = std::slice::from_mut(&mut candidates[e]);
+            self.polish(candidate)?;
+            self.refine(candidate)?;
         }
         Ok(())
     }

@@ -11,6 +11,8 @@
 //! 4. Where the parts of Θ differ by decades from player to player, Newton to the end for each of them (`refine`).
 //! 5. With next to no weight on S, or none, the stages above are those of two other Θ, from whose minima the weight is
 //!    lowered to γ's own: without any, which of equal minima is taken (`settle`).
+//! 6. Where γ₁ dominates, for what is not certified: a second search with heavier other weights, which are then lowered to
+//!    γ's own (`heavier`), and starts that fit GᵀRG to M player by player (`fits`).
 //!
 //! Games of N > 8 have a search of their own with the same stages, whose restarts a model of Θ chooses (`large`).
 //!
