@@ -14,12 +14,19 @@ import os, signal, sys, threading, time
 import numpy as np
 import tadcore
 from tadcore import statistics
-from tadcore.sampling import Box
+from tadcore.sampling import Box, Gaussian
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 what = sys.argv[1]
 sc = tadcore.scenarios.load("paper-i1")
 study = tadcore.Study(sc, {"attacker.position": Box([-3, -2], [3, 4])}, trials=200_000, seed=7)
+full = tadcore.scenarios.load("paper-i1-full")
+starts = {f"{p}.position": Gaussian(at, 0.022) for p, at in zip(full.players, full.positions)}
+near = tadcore.Study(full, starts, trials=1)
+still = {"attacker": {"position": [0, 0], "control_weight": 1.0, "capture_radius": 0.5, "disturbance": 0.3}}
+still |= {"target": {"position": [1.5, 0], "control_weight": 1.0}, "interaction": "I1", "horizon": 0.4, "step": 0.01}
+still |= {"defenders": [{"position": [0, 5], "control_weight": 1.0, "capture_radius": 0.1}]}
+shaken = tadcore.Study(tadcore.Scenario.model_validate(still), {}, trials=1)
 rng = np.random.default_rng(1)
 many = 5_000_000 if what in ("probabilities", "incidence") else 1
 kind = rng.integers(0, 3, many).astype(np.int8)
@@ -38,6 +45,8 @@ calls = {
     "best start": lambda: tadcore.best_start(study, "d3", x=(-2, 2), y=(-2, 2)),
     "best radii": lambda: tadcore.best_radii(study, 6.0, evaluations=10_000),
     "curve": lambda: tadcore.radius_curve(study, player="d1", radii=np.linspace(0.5, 6, 500), refine=True),
+    "rare": lambda: again(lambda: tadcore.rare(near, "intercepted", error=0.02)),
+    "rare paths": lambda: again(lambda: tadcore.rare(shaken, error=0.02)),
     "sweep": lambda: tadcore.sweep(study, {"attacker.control_weight": np.linspace(0.4, 2, 50)}),
     "sensitivity": lambda: tadcore.analysis.sensitivity(
         sc, {"attacker.position.x": statistics_uniform(), "attacker.position.y": statistics_uniform()},
@@ -66,7 +75,7 @@ except KeyboardInterrupt:
     print("interrupted", time.monotonic(), flush=True)
 os._exit(0)
 """
-QUESTIONS = ["verify", "map", "probability map", "best start", "best radii", "curve", "sweep"]
+QUESTIONS = ["verify", "map", "probability map", "best start", "best radii", "curve", "sweep", "rare", "rare paths"]
 STATISTICS = ["sensitivity", "probabilities", "incidence", "intervals"]
 
 
