@@ -32,6 +32,7 @@ CRATES = {"tadcore": Path("rust/tadcore/src"), "tadcore_kernels": Path("rust/tad
 # fixed seed.
 TESTS = [
     "synthesis",
+    "blocks",
     "global_minimum",
     "kernels",
     "tadcore",
