@@ -61,7 +61,7 @@ class Writer:
     def close(self) -> None:
         """Bring everything to the disk, and join what lies side by side."""
         try:
-            files = Counter(part.first // (parts.GROUP * CHUNK) for part in self._store.files)
+            files = Counter(self._group(part) for part in self._files())
             for group in sorted(files.keys() | self._open.keys() | self._before.keys()):
                 if group in self._open or group in self._before or files[group] > 1:
                     self._submit(group, join=True)
@@ -113,11 +113,19 @@ class Writer:
             else:
                 yield from (table for _, table in self._store.read(listed))
 
+    def _files(self) -> set[Part]:
+        """The parts that are there now: a copy, made at once, since other threads add theirs in the meantime."""
+        return self._store.files.copy()
+
+    @staticmethod
+    def _group(part: Part) -> int:
+        return part.first // (parts.GROUP * CHUNK)
+
     def _sweep(self, group: int) -> None:
         """Remove the parts of a group whose rows larger ones have."""
         in_use = {self._store.parts[chunk] for chunk in self._stored(group)}
-        for part in [part for part in self._store.files if part.first // (parts.GROUP * CHUNK) == group]:
-            if part not in in_use:
+        for part in self._files():
+            if self._group(part) == group and part not in in_use:
                 with faults(part.path):
                     part.path.unlink(missing_ok=True)
                 self._store.files.discard(part)

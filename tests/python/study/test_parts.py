@@ -3,6 +3,7 @@
 import concurrent.futures as futures
 import itertools
 import shutil
+import sys
 import threading
 import time
 from pathlib import Path
@@ -17,7 +18,9 @@ from tadcore.cli.app import main
 from tadcore.statistics import Tally
 from tadcore.study import merge_store
 from tadcore.study.part import chunks_of
+from tadcore.study.parts import Part, name_of
 from tadcore.study.plan import Outcomes, Played
+from tadcore.study.store import Store
 from tadcore.study.workers import Groups, Wanted, played_by
 
 TRIALS = 7 * CHUNK + 11
@@ -57,6 +60,21 @@ def test_merged_parts_are_the_study(keep, tmp_path):
     assert files(tmp_path / "parts") == files(tmp_path / "whole")
     assert {path.name for path in (tmp_path / "parts").glob("_*")} <= {"_manifest.json", "_store.lock"}
     assert tadcore.load_study(tmp_path / "parts").tally == whole.tally
+
+
+def test_parts_are_listed_while_another_thread_adds_some(tmp_path, monkeypatch):
+    """Two threads write: one looks through thousands of parts for those of its group while the other adds its own."""
+    monkeypatch.setattr("tadcore.study.parts.GROUP", 1)
+    there = [Part(tmp_path / name_of(i * CHUNK, (i + 1) * CHUNK), i * CHUNK, (i + 1) * CHUNK) for i in range(99, 9999)]
+    found = Store._found
+    monkeypatch.setattr(Store, "_found", lambda store: found(store) | set(there))
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        study(16 * CHUNK).run(store=tmp_path, keep="outcomes")
+    finally:
+        sys.setswitchinterval(interval)
+    assert len(files(tmp_path)) == 16
 
 
 @pytest.mark.parametrize("keep", KEEPS)
