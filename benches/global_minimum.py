@@ -79,7 +79,7 @@ def line(interaction: str, n: int, trials: int, starts: int, seed: int) -> tuple
             values = m.values(tadcore.solve_equilibrium(sc).P)
         rng = np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, 1]))
         k, network = int(rng.integers(sc.steps + 1)), rng.random((len(sc.constrained), n + 1)) < rng.random()
-        found = tadcore.synthesize(sc, step=k, adjacency=network)
+        found = tadcore.synthesize(sc, step=k, adjacency=network, method="restarts")
         reduced = FullObjective(sc, m, values[:, k], network, dim=1)
         begun = time.perf_counter()
         bound = bound_theta(reduced, found.theta)

@@ -367,6 +367,19 @@ def test_a_player_is_told_nothing_of_the_others_sight(monkeypatch):
         assert np.array_equal(seen[i], run.adjacency[0][i])
 
 
+@pytest.mark.parametrize("name", ["paper-i1", "paper-i2"])
+def test_the_protocol_runs_between_anchors_too(name):
+    """Where a minimum was followed from other instants it is still in the basin of the canonical start."""
+    run = play(name)
+    changed = np.flatnonzero((run.adjacency[1:-1] != run.adjacency[:-2]).any(axis=(1, 2))) + 1
+    found = [tadcore.synthesize(run.scenario, step=int(k), adjacency=run.adjacency[k]).start for k in changed]
+    assert "between" in found
+    report = v.check_decentral(run)
+    assert report.ok
+    assert not report.notes
+    assert report.checks[0].detail.startswith("3 networks")
+
+
 def test_a_protocol_that_stops_early_is_found(monkeypatch):
     run = play("paper-i1")
     assert v.check_decentral(run).ok
