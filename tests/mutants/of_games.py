@@ -92,7 +92,11 @@ MUTANTS = {
     "simulation/crossing.rs": [
         ("crossing: how far a part leaves its chord", "let off = «0.125 * width * width * bend»", "0.0"),
         ("crossing: what stays clear", "chord.nearest > «radius + chord.off»", "radius"),
-        ("crossing: the first of two roots", "chord.foot «-» inside.sqrt()", "+"),
+        (
+            "crossing: the first of two roots",
+            "«chord.foot - inside.sqrt() / chord.length»",
+            "chord.foot + inside.sqrt() / chord.length",
+        ),
         ("crossing: the earlier half first", "self.first(i, reach, «earlier»)", "later"),
         ("crossing: the nearest point of a chord", "p + share * «(q - p)»", "(p - q)"),
     ],

@@ -176,7 +176,7 @@ MUTANTS = {
         ("I2: substitution", "«row[j] -= factor * solved[j];»", "row[j] += factor * solved[j];"),
     ],
     "riccati/classes.rs": [
-        ("classes: weights of the others", "(members - 1) as f64 «* of[first]»", "/ of[first]"),
+        ("classes: weights of the others", "«(members - 1) as f64 * of[first]»", "(members - 1) as f64 / of[first]"),
         ("classes: P within a class", "«p[row + 1] * share[row]»", "p[row + 1]"),
         ("classes: P of a member itself", "_ if «i == j» => p[row]", "i == j + 1"),
         ("classes: share of a member", "«1.0 / (members - 1) as f64» } else", "1.0 / members as f64"),

@@ -334,7 +334,11 @@ MUTANTS = {
         ("Θ of a start: S", "«factor * x / self.root[i] - f»", "factor * x / self.root[i] + f"),
     ],
     "synthesis/search/settle.rs": [
-        ("without weight on S: signs", "map(|(g, f)| g * f).sum::<f64>() «< 0.0»", "> 0.0"),
+        (
+            "without weight on S: signs",
+            "if «g.iter().zip(f).map(|(g, f)| g * f).sum::<f64>() < 0.0» {",
+            "g.iter().zip(f).map(|(g, f)| g * f).sum::<f64>() > 0.0",
+        ),
     ],
     "synthesis/search/stages.rs": [
         ("back from two parts", "«a + sign * b»", "a + sign + b"),
@@ -372,12 +376,16 @@ MUTANTS = {
         ("K_i of the attacker", "if topology.sees_attacker(i) { «row.iter().sum()» } else", "-row.iter().sum::<f64>()"),
     ],
     "synthesis/search/blocks.rs": [
-        ("blocks: what couples turning ones", "of.gram[i * problem.rows + j] * same «-» coupled", "+"),
+        (
+            "blocks: what couples turning ones",
+            "«of.gram[i * problem.rows + j] * same - coupled»",
+            "of.gram[i * problem.rows + j] * same + coupled",
+        ),
         ("blocks: whose columns are coupled", "«p[i * n + b]» * p[j * n + a]", "p[i * n + a]"),
-        ("blocks: X", "squares.clone().sum::<f64>() «-» of.target[a * n + b]", "+"),
+        ("blocks: X", "squares.clone().sum::<f64>() - «of.target[a * n + b]»", "-of.target[a * n + b]"),
         ("blocks: direction of a player seen", "out.push((v.own % n, «-1.0»))", "1.0"),
         ("blocks: weight on S", "+ «2.0 * of.closeness[i] * same»", "0.0"),
-        ("blocks: pivot", "scale(row) * scale(column) «-» known", "+"),
+        ("blocks: pivot", "scale(row) * scale(column) - «known»", "-known"),
         ("blocks: sign of a pivot", "«pivot <= 0.0» || pivot.is_nan()", "pivot <= -1.0"),
     ],
 }

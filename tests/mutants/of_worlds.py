@@ -21,7 +21,7 @@ MUTANTS = {
         ("normal: which tail", "libm::log(if «q < 0.0» {", "q > 0.0"),
         ("normal: sign", "if «q < 0.0» { -size }", "q > 0.0"),
         ("normal, many: which tail", "select(«x.less(V::Eight::splat(0.0))», V", "V::Eight::splat(0.0).less(x)"),
-        ("normal, many: near tail", "(-ln(*p)).sqrt() «- 1.6»", "+ 1.6"),
+        ("normal, many: near tail", "(-ln(*p)).sqrt() - «1.6»", "-1.6"),
         ("normal, many: far tails", "if «V::Eight::bits(V::Eight::splat(NOT_FAR).less(most)) == 0»", "true"),
         ("ln: halves", "s * («half + (odd + even)»)", "half - (odd + even)"),
     ],
@@ -57,8 +57,8 @@ MUTANTS = {
     "ensemble/noise.rs": [
         (
             "batches: disturbance of the attacker",
-            "let by = V::Eight::load(&by[at..]) «- V::Eight::load(&own[at..])»",
-            "+ V::Eight::load(&own[at..])",
+            "let by = «V::Eight::load(&by[at..]) - V::Eight::load(&own[at..])»",
+            "V::Eight::load(&by[at..]) + V::Eight::load(&own[at..])",
         ),
     ],
     "ensemble/network.rs": [

@@ -161,7 +161,7 @@ def test_costs_and_values_are_finite(sc):
 @settings(max_examples=12, deadline=None)
 @given(
     st.sampled_from(["I1", "I2"]),
-    st.sampled_from([9, 30, 61, 100, 201, 320]),
+    st.sampled_from([9, 30, 61, 100, 201, 320, 500]),
     st.sampled_from([1e-9, 1e-6, 1e-3]),
     st.sampled_from([1e-3, 0.4, 0.9, 20.0, math.inf]),
     st.integers(0, 2**32 - 1),

@@ -36,6 +36,13 @@ def test_every_quoted_line_stands_once_in_its_file(mutants):
         assert len(re.findall(r"crate::mutant\(\d+\)", after)) == sum(own == file for _, own, *_ in listed)
 
 
+def test_what_is_replaced_is_an_expression(mutants):
+    """An operator, or one with what follows it, would not compile beside a choice in parentheses."""
+    for _, file, formula, marked, _ in mutants.numbered():
+        part = re.search("«(.*)»", marked, re.S)[1]
+        assert not re.match(r"[-+*/%&|<>=]+( |$)", part), (file, formula)
+
+
 def test_a_quoted_line_that_is_gone_is_named(mutants):
     number, file, formula, marked, instead = mutants.numbered()[0]
     with pytest.raises(SystemExit, match=re.escape(f"{file}, {formula}: not once")):
