@@ -7,6 +7,13 @@ MUTANTS = {
         ("seen by whom", "wrapping_add(mix(«!players[i].colour»))", "players[i].colour"),
         ("places of a class", "order[at] = «i»;", "at"),
     ],
+    "policy/anchors.rs": [
+        ("anchors: where between two", "let share = (step «- part(low)») as f64", "- 0 * part(low)"),
+        ("anchors: the point between", "«a + share * *x»", "a - share * *x"),
+        ("anchors: how far P moves", "apart += «(x - y) * (x - y)»;", "(x - y)"),
+        ("anchors: one branch", "norm(&point) > «NEAR * norm(&a.rows)»", "0.0"),
+        ("anchors: whose gains", "self.at_anchor(«low», None", "high"),
+    ],
     "policy/filler.rs": [
         ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),
         ("a solved entry under its own name", "out[«j * rows + i»] = x", "i * rows + j"),

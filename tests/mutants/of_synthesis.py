@@ -333,6 +333,18 @@ MUTANTS = {
         ("Θ of a start: E_p", "scratch[b * n + a] += «d * w»;", "-d * w"),
         ("Θ of a start: S", "«factor * x / self.root[i] - f»", "factor * x / self.root[i] + f"),
     ],
+    "synthesis/search/fits.rs": [
+        ("fits: what is left", "fit.add(i, «-1.0»);", "1.0"),
+        ("fits: the size of a row", "let size = «value.max(0.0).sqrt()».copysign(along)", "value.max(0.0)"),
+        ("fits: its sign", ".copysign(«along»)", "-along"),
+        ("fits: differences only", "f64::from(u8::from(a == b)) «- mean»", "+ mean"),
+        ("fits: the largest eigenvalue", "(eigen.S()[«d - 1»], row)", "0"),
+    ],
+    "synthesis/search/heavier.rs": [
+        ("heavier: W", "times(w, «factor.sqrt()»)", "factor"),
+        ("heavier: c", "times(&mut of.closeness, «factor»);", "factor.sqrt()"),
+        ("heavier: the Hessian's constant part", "for_each(|q| times(q, «factor»));", "1.0"),
+    ],
     "synthesis/search/settle.rs": [
         (
             "without weight on S: signs",

@@ -7,6 +7,7 @@ use crate::game::Interaction;
 use crate::simd::Width;
 
 mod descents;
+mod dominated;
 mod moves;
 mod single;
 mod starts;

@@ -31,7 +31,7 @@ struct Fit<'a> {
 }
 
 /// The starts that are worth a descent.
-pub(super) fn fits(problem: &Problem, candidate: &Candidate) -> Vec<Vec<f64>> {
+pub(crate) fn fits(problem: &Problem, candidate: &Candidate) -> Vec<Vec<f64>> {
     let (n, of) = (problem.size, &problem.theta.double);
     let best = Moves::new(problem, candidate);
     let mut players: Vec<usize> = candidate.variables.iter().map(|v| v.own / n).collect();

@@ -88,7 +88,7 @@ impl Problem {
     }
 
     /// Θ with every weight but γ₁ so many times as large, a power of four.
-    fn heavier(&self, factor: f64) -> Precisions {
+    pub(crate) fn heavier(&self, factor: f64) -> Precisions {
         let mut of = self.theta.double.clone();
         let times = |numbers: &mut Vec<f64>, factor: f64| numbers.iter_mut().for_each(|x| *x *= factor);
         of.coupling.iter_mut().for_each(|w| times(w, factor.sqrt()));

@@ -61,6 +61,8 @@ pub use candidate::Start;
 #[cfg(test)]
 pub(crate) use dispatch::Kind;
 pub(crate) use dispatch::{Dispatcher, SIDE_BY_SIDE_UP_TO};
+#[cfg(test)]
+pub(crate) use fits::fits;
 pub(crate) use gradient::descend;
 #[cfg(test)]
 pub(crate) use moves::Moves;
