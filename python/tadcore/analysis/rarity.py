@@ -24,7 +24,8 @@ class RareEvent:
     event : str
         The outcome.
     probability : float
-        The mean of the replications, unbiased.
+        The mean of the replications, each of which is unbiased; where more of them were played because the first twenty
+        spread too far, only up to what that choice adds.
     interval : tuple of float
         (low, high), Student's interval of that mean at ``level``.
     level : float

@@ -1,21 +1,25 @@
-//! Starts that fit GᵀRG to M player by player: where γ₁ dominates, Θ is little else than ‖GᵀRG − M‖².
+//! Starts that fit GᵀRG to M player by player: Θ's first term is ‖GᵀRG − M‖², and little else where γ₁ dominates.
 //!
 //! With H = √R·G it is ‖M − Σ_i h_iᵀh_i‖², and of one row, the others given, the best is known: √λ v, the largest
 //! eigenvalue and its vector of what the others leave of M, restricted to what the player may use. Who comes first decides
 //! who plays what. Each player is once the first, and each pair once the first two; of the rest the one comes next whose
-//! eigenvalue is the largest. Two rounds, in which every row is fitted anew, follow.
+//! eigenvalue is the largest. A round in which every row is fitted anew follows.
 //!
 //! Source: ours.
-
-use faer::{Mat, Side};
 
 use super::candidate::Candidate;
 use super::moves::Moves;
 use crate::simd::norm;
-use crate::synthesis::theta::Problem;
+use crate::synthesis::theta::{Problem, TABULATED_UP_TO};
 
+/// The most players that one player may see, itself included: large games are not searched so.
+const MOST: usize = TABULATED_UP_TO;
+/// Sweeps of Jacobi's method; four are enough for eight rows.
+const SWEEPS: usize = 8;
+/// What may be left beside the diagonal: for a start ten digits of a vector will do.
+const ENOUGH: f64 = 1e-20;
 /// Rounds after the first.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 1;
 /// Θ at a start relative to the best point up to which it is worth a descent, and how far from another one it must be.
 const WORTH: f64 = 3.0;
 const APART: f64 = 1e-3;
@@ -39,19 +43,30 @@ pub(crate) fn fits(problem: &Problem, candidate: &Candidate) -> Vec<Vec<f64>> {
     let mut found: Vec<Vec<f64>> = Vec::new();
     let mut scratch = Vec::new();
     for &first in &players {
-        for &second in &players {
+        // Whom the largest eigenvalue takes after the first.
+        let mut next = None;
+        for second in std::iter::once(first).chain(players.iter().copied().filter(|&second| second != first)) {
+            if next == Some(second) {
+                continue;
+            }
             let mut fit = Fit::new(candidate, n, &best.root, &of.fne, &of.target, &players);
             let mut rest = players.clone();
-            for player in if first == second { vec![first] } else { vec![first, second] } {
+            let mut play = |fit: &mut Fit, player: usize| {
                 fit.fit(player);
                 rest.retain(|&other| other != player);
+                fit.next(&rest)
+            };
+            let mut then = play(&mut fit, first);
+            if second == first {
+                next = then;
+            } else {
+                then = play(&mut fit, second);
             }
-            while let Some(next) = rest.iter().copied().max_by(|&a, &b| fit.largest(a).0.total_cmp(&fit.largest(b).0)) {
-                fit.fit(next);
-                rest.retain(|&other| other != next);
+            while let Some(player) = then {
+                then = play(&mut fit, player);
             }
-            for &player in players.iter().cycle().take(ROUNDS * players.len()) {
-                fit.fit(player);
+            for _ in 0..ROUNDS {
+                players.iter().for_each(|&player| fit.fit(player));
             }
             let limit = WORTH * candidate.reached.value;
             let change: Vec<(usize, &[f64], f64)> = players.iter().map(|&i| (i, &fit.h[i * n..][..n], 1.0)).collect();
@@ -107,17 +122,26 @@ impl<'a> Fit<'a> {
             used.push(i);
         }
         let d = used.len();
-        let part = Mat::from_fn(d, d, |a, b| self.left[used[a] * n + used[b]]);
-        // Rows that know differences only sum to zero.
-        let mean = if relative { 1.0 / d as f64 } else { 0.0 };
-        let centre = Mat::from_fn(d, d, |a, b| f64::from(u8::from(a == b)) - mean);
-        let part = &centre * &part * &centre;
-        let mut row = vec![0.0; n];
-        let Ok(eigen) = part.self_adjoint_eigen(Side::Lower) else { return (0.0, row) };
-        for (a, &j) in used.iter().enumerate() {
-            row[j] = eigen.U()[(a, d - 1)];
+        let mut part = [0.0; MOST * MOST];
+        for (a, row) in part.chunks_exact_mut(MOST).enumerate().take(d) {
+            (0..d).for_each(|b| row[b] = self.left[used[a] * n + used[b]]);
         }
-        (eigen.S()[d - 1], row)
+        if relative {
+            centre(&mut part, d);
+        }
+        let (value, vector) = largest_pair(&mut part, d);
+        let mut row = vec![0.0; n];
+        used.iter().zip(vector).for_each(|(&j, x)| row[j] = x);
+        (value, row)
+    }
+
+    /// Whose eigenvalue is the largest.
+    fn next(&self, rest: &[usize]) -> Option<usize> {
+        if let [only] = rest {
+            return Some(*only);
+        }
+        let values = rest.iter().map(|&player| (self.largest(player).0, player));
+        values.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, player)| player)
     }
 
     /// Fits the row of one player, with the sign that is nearer to the equilibrium.
@@ -130,4 +154,59 @@ impl<'a> Fit<'a> {
         self.h[i * n..(i + 1) * n].iter_mut().zip(&vector).for_each(|(h, v)| *h = size * v);
         self.add(i, -1.0);
     }
+}
+
+/// A := (**I** − 11ᵀ/d) A (**I** − 11ᵀ/d): rows that know differences only sum to zero.
+fn centre(a: &mut [f64; MOST * MOST], d: usize) {
+    for along in [1, MOST] {
+        for line in 0..d {
+            let at = |k: usize| line * (MOST + 1 - along) + k * along;
+            let mean = (0..d).map(|k| a[at(k)]).sum::<f64>() / d as f64;
+            (0..d).for_each(|k| a[at(k)] -= mean);
+        }
+    }
+}
+
+/// The largest eigenvalue of a symmetric matrix of d rows, and its vector, by Jacobi's method.
+fn largest_pair(a: &mut [f64; MOST * MOST], d: usize) -> (f64, [f64; MOST]) {
+    let mut v = [0.0; MOST * MOST];
+    (0..d).for_each(|i| v[i * MOST + i] = 1.0);
+    for _ in 0..SWEEPS {
+        let (mut off, mut all) = (0.0, 0.0);
+        for (i, row) in a.chunks_exact(MOST).enumerate().take(d) {
+            row[..d].iter().enumerate().for_each(|(j, x)| {
+                all += x * x;
+                off += if i == j { 0.0 } else { x * x };
+            });
+        }
+        if off <= ENOUGH * all {
+            break;
+        }
+        for p in 0..d {
+            for q in p + 1..d {
+                let (app, aqq, apq) = (a[p * MOST + p], a[q * MOST + q], a[p * MOST + q]);
+                if apq == 0.0 {
+                    continue;
+                }
+                let theta = (aqq - app) / (2.0 * apq);
+                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let c = 1.0 / (t * t + 1.0).sqrt();
+                let s = t * c;
+                for k in 0..d {
+                    let (x, y) = (a[k * MOST + p], a[k * MOST + q]);
+                    (a[k * MOST + p], a[k * MOST + q]) = (c * x - s * y, s * x + c * y);
+                }
+                for k in 0..d {
+                    let (x, y) = (a[p * MOST + k], a[q * MOST + k]);
+                    (a[p * MOST + k], a[q * MOST + k]) = (c * x - s * y, s * x + c * y);
+                    let (x, y) = (v[p * MOST + k], v[q * MOST + k]);
+                    (v[p * MOST + k], v[q * MOST + k]) = (c * x - s * y, s * x + c * y);
+                }
+            }
+        }
+    }
+    let best = (0..d).max_by(|&i, &j| a[i * MOST + i].total_cmp(&a[j * MOST + j])).unwrap_or(0);
+    let mut vector = [0.0; MOST];
+    vector[..d].copy_from_slice(&v[best * MOST..][..d]);
+    (a[best * MOST + best], vector)
 }

@@ -20,14 +20,17 @@ const MOST: f64 = 1024.0;
 const STEP: f64 = 4.0;
 
 impl Search<'_> {
-    /// More for the candidates that are not certified, where γ₁ dominates.
+    /// More for the candidates that are not certified: where γ₁ dominates with heavier weights, and everywhere from fits.
     pub(super) fn search_heavier(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
         let problem = self.problem;
         let ratio = problem.dominance();
         let open: Vec<usize> =
             (0..candidates.len()).filter(|&e| !candidates[e].complete && !candidates[e].certified).collect();
-        if problem.is_large() || ratio < DOMINATES || open.is_empty() {
+        if problem.is_large() || open.is_empty() {
             return Ok(());
+        }
+        if ratio < DOMINATES {
+            return self.fit(candidates, &open, Vec::new());
         }
         let mut factors = vec![STEP];
         while let Some(factor) = factors.last().map(|last| last * STEP).filter(|&next| next <= MOST.min(ratio * STEP)) {
@@ -56,8 +59,14 @@ impl Search<'_> {
                 lower.push(e);
             }
         }
+        self.fit(candidates, &open, lower)
+    }
+
+    /// Descents from the fits of [`fits`]; those that led lower, and `lower` itself, go on to the end of the search.
+    fn fit(&mut self, candidates: &mut [Candidate], open: &[usize], mut lower: Vec<usize>) -> Result<(), Stopped> {
+        let problem = self.problem;
         self.begin(1);
-        for &e in &open {
+        for &e in open {
             for start in fits(problem, &candidates[e]) {
                 let point = self.tasks.add(e, false, 0.0)?;
                 point.copy_from_slice(&start);

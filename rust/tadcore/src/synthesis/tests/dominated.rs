@@ -53,7 +53,7 @@ fn left(problem: &Problem, g: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt() / of.scale.target
 }
 
-/// M has as many eigenvectors as there are players: where everyone sees everyone it is fitted to all digits.
+/// M has as many eigenvectors as there are players: where everyone sees everyone it is fitted to ten digits.
 #[test]
 fn who_sees_everyone_fits_m_exactly() {
     let (problem, mut candidate, _) = candidate(|_, _| true);
@@ -62,7 +62,7 @@ fn who_sees_everyone_fits_m_exactly() {
     let found = fits(&problem, &candidate);
     assert!(!found.is_empty());
     for g in &found {
-        assert!(left(&problem, g) < 1e-13, "{:e}", left(&problem, g));
+        assert!(left(&problem, g) < 1e-9, "{:e}", left(&problem, g));
     }
 }
 
@@ -91,7 +91,7 @@ fn fits_are_admissible_and_cannot_be_improved_by_much_along_a_row() {
                 if v.relative {
                     other[v.own] -= step;
                 }
-                assert!(left(&problem, &other) >= there * (1.0 - 1e-12), "{}", v.entry);
+                assert!(left(&problem, &other) >= there * (1.0 - 1e-9), "{}", v.entry);
             }
         }
     }
