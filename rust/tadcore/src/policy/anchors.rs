@@ -138,6 +138,7 @@ impl Policy {
                 let part = |anchor: usize| self.anchors.steps[anchor];
                 let share = (step - part(low)) as f64 / (part(high) - part(low)) as f64;
                 let (mut followed, mut networks, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+                let mut certain = Vec::new();
                 let wanted: Vec<usize> = (0..forms.len()).filter(|&index| !forms[index].is_complete()).collect();
                 let listed: Vec<Topology> = wanted.iter().map(|&index| forms[index].clone()).collect();
                 let before = self.at_anchor(low, None, &listed, solver, cancel)?;
@@ -149,12 +150,15 @@ impl Policy {
                             followed.push(index);
                             networks.push(forms[index].clone());
                             starts.push(start);
+                            certain.push(a.certified && b.certified);
                         }
                         None => alone.push(index),
                     }
                 }
                 solver.follow_all(problem, &networks, &starts, |at, gains| {
-                    match gains {
+                    // Between two that are proved to be the lowest one is proved, too, or there is another.
+                    let proved = |gains: &Gains| gains.certified || !certain[at];
+                    match gains.filter(proved) {
                         Some(gains) => each(followed[at], &gains)?,
                         None => alone.push(followed[at]),
                     }

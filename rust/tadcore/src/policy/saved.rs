@@ -113,9 +113,13 @@ pub(super) fn write(transitions: &Transitions, game: &Game, cancel: &CancelToken
     let mut count = 0u64;
     for step in 0..transitions.instants() {
         let table = transitions.step_table(step);
-        count += table.len() as u64;
         for (i, key) in table.keys().enumerate() {
             cancel.check()?;
+            // Just before an escape a step may overflow. Such entries are no saved table's, and are solved again.
+            if !table.matrix(i + 1).iter().all(|x| x.is_finite()) {
+                continue;
+            }
+            count += 1;
             reserve("the table as bytes", &mut out, shape.entry + 8)?;
             out.extend_from_slice(&(step as u64).to_le_bytes());
             key.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));

@@ -22,9 +22,11 @@ const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
 /// Rounds of moves, each from the best point of the one before.
 pub(super) const ROUNDS: usize = 4;
-/// Steps that Newton's method may take from between two minima, and how far, relative to the gains, it may lead.
-const CONTINUED: usize = 8;
-const MOVED: f64 = 0.05;
+/// Steps that Newton's method may take from between two minima, how far, relative to the gains, it may lead, and the
+/// gradient aimed at: the last step is made for what a gradient within the tolerance leaves in a valley.
+const CONTINUED: usize = 5;
+const MOVED: f64 = 0.01;
+const CLOSE: f64 = 1e-15;
 /// Iterations, at most, after the tolerance is met in such a valley.
 const POLISH: usize = 50;
 
@@ -150,7 +152,7 @@ impl Search<'_> {
             candidate.in_double(point);
         }
         let limits = self.limits;
-        self.limits.iterations = CONTINUED;
+        self.limits = Limits { iterations: CONTINUED, tolerance: CLOSE, ..limits };
         self.descend(Kind::Certified, candidates)?;
         self.limits = limits;
         let mut near = Vec::with_capacity(candidates.len());
