@@ -16,8 +16,9 @@ use tadcore::synthesis::{Gains, Options, Problem, Status, Synthesizer};
 /// By how much, relatively, Θ may be above the lowest known.
 const LOWER: f64 = 1e-9;
 
-/// Iterations of all descents of [`of_games`] together, measured in November 2026, and what may come on top.
-const ITERATIONS: (usize, f64) = (56_005, 1.03);
+/// Iterations of all descents of [`of_games`] together, measured in November 2026, and what may come on top. Descents
+/// from fits of GᵀRG are a sixth of them: without they were 56,005, and seven of 8,000 visited pairs were missed, not one.
+const ITERATIONS: (usize, f64) = (67_530, 1.03);
 
 /// One instant and network, with the lowest Θ known.
 struct Instant {
