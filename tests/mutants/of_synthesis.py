@@ -337,7 +337,7 @@ MUTANTS = {
         ("fits: what is left", "fit.add(i, «-1.0»);", "1.0"),
         ("fits: the size of a row", "let size = «value.max(0.0).sqrt()».copysign(along)", "value.max(0.0)"),
         ("fits: its sign", ".copysign(«along»)", "-along"),
-        ("fits: differences only", "a[at(k)] «-= mean»", "+= mean"),
+        ("fits: differences only", "«a[at(k)] -= mean»", "a[at(k)] += mean"),
         ("fits: the largest eigenvalue", "let best = (0..d).«max_by»(", "min_by"),
         ("fits: a rotation", "«theta.signum() / (theta.abs()» +", "1.0 / (theta.abs()"),
     ],
