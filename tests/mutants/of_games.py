@@ -8,7 +8,7 @@ MUTANTS = {
         ("places of a class", "order[at] = «i»;", "at"),
     ],
     "policy/anchors.rs": [
-        ("anchors: where between two", "let share = (step «- part(low)») as f64", "- 0 * part(low)"),
+        ("anchors: where between two", "let share = «(step - part(low))» as f64", "step"),
         ("anchors: the point between", "«a + share * *x»", "a - share * *x"),
         ("anchors: how far P moves", "apart += «(x - y) * (x - y)»;", "(x - y)"),
         ("anchors: one branch", "norm(&point) > «NEAR * norm(&a.rows)»", "0.0"),

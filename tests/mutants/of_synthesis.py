@@ -338,8 +338,8 @@ MUTANTS = {
         ("fits: the size of a row", "let size = «value.max(0.0).sqrt()».copysign(along)", "value.max(0.0)"),
         ("fits: its sign", ".copysign(«along»)", "-along"),
         ("fits: differences only", "«a[at(k)] -= mean»", "a[at(k)] += mean"),
-        ("fits: the largest eigenvalue", "let best = (0..d).«max_by»(", "min_by"),
-        ("fits: a rotation", "«theta.signum() / (theta.abs()» +", "1.0 / (theta.abs()"),
+        ("fits: which eigenvalue", "max_by(|&i, &j| «a[i * MOST + i].total_cmp(&a[j * MOST + j])»)", "j.cmp(&i)"),
+        ("fits: a rotation", "let s = «t * c»;", "-t * c"),
     ],
     "synthesis/search/heavier.rs": [
         ("heavier: W", "times(w, «factor.sqrt()»)", "factor"),
