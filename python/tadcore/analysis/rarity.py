@@ -40,7 +40,8 @@ class RareEvent:
         Scores that were climbed to one after another, the last just below 0. Empty where paths were split: there every
         replication has levels of its own.
     rates : ndarray of float64, shape (R, m)
-        Of each replication the share above each level among what was above the level before.
+        Of each replication the share above each level among what was above the level before; no columns where
+        paths were split.
     shares : dict of str to float
         Of ``"intercepted"`` the share of each defender; empty for another event.
     seed : int
@@ -90,7 +91,7 @@ class RareEvent:
 
     def _repr_html_(self) -> str:
         mean, spread = self.rates.mean(axis=0), self.rates.std(axis=0, ddof=1)
-        scores = [f"{level:.4g}" for level in self.levels[:-1]] + ["0"]
+        scores = [f"{level:.4g}" for level in self.levels[:-1]] + ["0"] * (len(self.levels) > 0)
         rows = [
             [f"{i + 1}", score, f"{rate:.4f}", f"{sd:.4f}", ""]
             for i, (score, rate, sd) in enumerate(zip(scores, mean, spread, strict=True))

@@ -311,7 +311,13 @@ def test_starts_and_paths_are_both_random():
     parts = [first_passage(3.0 - 0.3 * x, 0.1, 40) if 0.3 * x < 2.5 else 1.0 for x in nodes]
     truth = float(np.dot(weights, parts) / weights.sum())
     assert 1e-6 < truth < 1e-4
-    agrees(tadcore.rare(study, error=0.1), truth)
+    found = tadcore.rare(study, error=0.1)
+    agrees(found, truth)
+    # Paths have no levels in common, so there is no table of them.
+    page = found._repr_html_()
+    assert "P(captured) = " in page
+    assert "<table" not in page
+    assert found.to_dict()["rates"] == found.to_dict()["levels"] == []
 
 
 @pytest.mark.parametrize(
