@@ -21,7 +21,7 @@ class Work(Generic[Piece]):
     Parameters
     ----------
     make : callable
-        Yields the pieces, and looks at the stop that it is given.
+        Yields the pieces, and polls the stop that it is given.
     show, fail : callable
         Called on the page's thread with a piece, if no later one is there already, or with an error.
     post : callable

@@ -212,7 +212,7 @@ def simulate_batch(
 
 
 def _refuse_scores(termination: Termination, *, passes: bool) -> None:
-    """Refuse what looks between two instants: a score is of the instants of the grid."""
+    """Refuse what depends on the motion between two instants: scores are of the instants of the grid."""
     rule = "with scores, which compare distances at the instants of the grid"
     if termination == "continuous":
         raise ScenarioError("termination", termination, f'"sampled" {rule}')

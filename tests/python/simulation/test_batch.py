@@ -183,7 +183,7 @@ def test_nothing_that_was_given_is_changed(sc):
 
 @pytest.mark.parametrize("scores", [False, True])
 def test_progress_changes_nothing(sc, scores, monkeypatch, capsys):
-    """In pieces a batch has the same bits; nothing is written where no terminal watches."""
+    """In pieces a batch is bitwise the same; nothing is written where no terminal watches."""
     monkeypatch.setattr("tadcore.simulation.batch._PIECE", 7)
     shaken = sc.replace({"disturbance": {"defenders": 0.05}})
     positions = starts(sc, 40)

@@ -262,7 +262,7 @@ dispatch! {
         let (scores, clear) = kept.split_at_mut(columns(n));
         let (own, of_team) = scores.split_at_mut(BEFORE);
         let (clear, of_team) = (&mut clear[..=n], &mut of_team[..n]);
-        let (nought, missed) = (V::Eight::splat(0.0), V::Eight::splat(MISSED));
+        let (zero, missed) = (V::Eight::splat(0.0), V::Eight::splat(MISSED));
         let free = V::Eight::load(&clear[n]);
         let mut nearest = V::Eight::splat(f64::NEG_INFINITY);
         for i in 0..n {
@@ -279,7 +279,7 @@ dispatch! {
                 // the sign is that of the squares.
                 let after = if j > i { squares_i.at_most(squares_j) } else { squares_i.less(squares_j) };
                 let by = d_j - d_i;
-                let by = V::Eight::select(after, larger(by, nought), smaller(by, missed));
+                let by = V::Eight::select(after, larger(by, zero), smaller(by, missed));
                 let first = larger(strict(d_j - V::Eight::load(&sigma[j])), by);
                 margin = smaller(margin, smaller(V::Eight::load(&clear[j]), first));
             }
@@ -323,7 +323,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_strict_margin_is_never_nought() {
+    fn a_strict_margin_is_never_zero() {
         assert_eq!([1.5, 5e-324, 0.0, -0.0, -2.0].map(strict), [1.5, 5e-324, -5e-324, -5e-324, -2.0]);
     }
 }

@@ -1,5 +1,5 @@
 //! Gains between anchors: at some instants every network is searched for by itself, at those between them Newton's method
-//! goes on from the minima at the two around.
+//! begins between the minima at the two around.
 //!
 //! P(t) is smooth, and with it the minimisers of Θ: from one instant to the next a branch of minima moves a little, and
 //! which branch is the lowest seldom changes. *Anchors* are instants of the grid between which P changes by at most
@@ -262,8 +262,8 @@ mod tests {
         }
     }
 
-    /// Every network of the paper's games at some instants: the lowest minimum, for a few steps; with the same bits
-    /// whatever was asked for before.
+    /// Every network of the paper's games at some instants: the lowest minimum, for a few steps; bitwise the
+    /// same whatever was asked for before.
     #[test]
     fn what_is_followed_is_what_is_found_by_searching() {
         for (interaction, every) in [(Interaction::I1, 5), (Interaction::I2, 97)] {
