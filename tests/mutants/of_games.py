@@ -8,11 +8,11 @@ MUTANTS = {
         ("places of a class", "order[at] = «i»;", "at"),
     ],
     "policy/anchors.rs": [
-        ("anchors: where between two", "let share = «(step - part(low))» as f64", "step"),
+        ("anchors: where between two", "share: «(step - a)» as f64", "step"),
         ("anchors: the point between", "«a + share * *x»", "a - share * *x"),
         ("anchors: how far P moves", "apart += «(x - y) * (x - y)»;", "(x - y)"),
         ("anchors: one branch", "norm(&point) > «NEAR * norm(&a.rows)»", "0.0"),
-        ("anchors: whose gains", "self.at_anchor(«low», None", "high"),
+        ("anchors: whose gains", "self.at_anchor(«stretch.low», None", "stretch.high"),
     ],
     "policy/filler.rs": [
         ("an entry under another name", "from[«other_j * rows + other_i»]", "other_i * rows + other_j"),

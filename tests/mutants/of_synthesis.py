@@ -346,6 +346,13 @@ MUTANTS = {
         ("heavier: c", "times(&mut of.closeness, «factor»);", "factor.sqrt()"),
         ("heavier: the Hessian's constant part", "for_each(|q| times(q, «factor»));", "1.0"),
     ],
+    "synthesis/search/refine.rs": [
+        (
+            "polish: a flatter point",
+            "if «reached.gradient_norm < candidate.reached.gradient_norm»",
+            "reached.gradient_norm > candidate.reached.gradient_norm",
+        ),
+    ],
     "synthesis/search/settle.rs": [
         (
             "without weight on S: signs",
@@ -356,11 +363,6 @@ MUTANTS = {
     "synthesis/search/stages.rs": [
         ("back from two parts", "«a + sign * b»", "a + sign + b"),
         ("which doubled gains", "if «doubled.kind(task).0» {", "!doubled.kind(task).0"),
-        (
-            "polish: a flatter point",
-            "if «reached.gradient_norm < candidate.reached.gradient_norm»",
-            "reached.gradient_norm > candidate.reached.gradient_norm",
-        ),
         ("where screening got", "«point.copy_from_slice(screened.point(descent));»", "let _ = screened;"),
         ("what screening leaves to be done", "«!screened.pruned(descent)»", "false"),
     ],

@@ -4,7 +4,7 @@
 //! a + b = s + ((a − (s − t)) + (b − t)), s = fl(a + b), t = fl(s − a) (Knuth), and ab = p + fma(a, b, −p), p = fl(ab).
 //! Sums and products of double-doubles keep these and are off by some 2⁻¹⁰⁴ of their parts (Dekker, *A floating-point
 //! technique for extending the available precision*, 1971). All of it is IEEE arithmetic, so every processor and every
-//! width of its vectors is bitwise the same.
+//! width of its vectors gives bitwise equal results.
 
 use crate::error::NoMemory;
 use crate::memory::zeros;

@@ -12,7 +12,7 @@
 //!
 //! | symbol | here | meaning |
 //! |---|---|---|
-//! | a ≤ k ≤ b | [`Anchors::around`] | the anchors next to an instant |
+//! | a ≤ k ≤ b | [`Anchors::place`] | the anchors next to an instant |
 //! | G_a + (k − a)/(b − a) · (G_b − G_a) | [`between`] | where Newton begins |
 
 use std::collections::HashMap;
@@ -48,7 +48,14 @@ enum Place {
     /// At an anchor.
     At(usize),
     /// Between two anchors.
-    Between(usize, usize),
+    Between(Stretch),
+}
+
+/// Two neighbouring anchors, and what part of the way from one to the other an instant is.
+struct Stretch {
+    low: usize,
+    high: usize,
+    share: f64,
 }
 
 impl Anchors {
@@ -84,7 +91,10 @@ impl Anchors {
         }
         match self.steps.binary_search(&step) {
             Ok(anchor) => Place::At(anchor),
-            Err(after) => Place::Between(after - 1, after),
+            Err(high) => {
+                let (low, [a, b]) = (high - 1, [self.steps[high - 1], self.steps[high]]);
+                Place::Between(Stretch { low, high, share: (step - a) as f64 / (b - a) as f64 })
+            }
         }
     }
 
@@ -126,48 +136,56 @@ impl Policy {
         cancel: &CancelToken,
         mut each: impl FnMut(usize, &Gains) -> Result<(), Stopped>,
     ) -> Result<(), Stopped> {
-        let mut alone: Vec<usize> = Vec::new();
-        match self.anchors.place(step) {
-            _ if !problem.is_followed() => alone.extend(0..forms.len()),
+        let alone = match self.anchors.place(step) {
+            _ if !problem.is_followed() => (0..forms.len()).collect(),
             Place::At(anchor) => {
                 for (index, gains) in self.at_anchor(anchor, Some(problem), forms, solver, cancel)?.iter().enumerate() {
                     each(index, gains)?;
                 }
+                Vec::new()
             }
-            Place::Between(low, high) => {
-                let part = |anchor: usize| self.anchors.steps[anchor];
-                let share = (step - part(low)) as f64 / (part(high) - part(low)) as f64;
-                let (mut followed, mut networks, mut starts) = (Vec::new(), Vec::new(), Vec::new());
-                let mut certain = Vec::new();
-                let wanted: Vec<usize> = (0..forms.len()).filter(|&index| !forms[index].is_complete()).collect();
-                let listed: Vec<Topology> = wanted.iter().map(|&index| forms[index].clone()).collect();
-                let before = self.at_anchor(low, None, &listed, solver, cancel)?;
-                let after = self.at_anchor(high, None, &listed, solver, cancel)?;
-                alone.extend((0..forms.len()).filter(|&index| forms[index].is_complete()));
-                for (&index, (a, b)) in wanted.iter().zip(before.iter().zip(&after)) {
-                    match between(a, b, share)? {
-                        Some(start) => {
-                            followed.push(index);
-                            networks.push(forms[index].clone());
-                            starts.push(start);
-                            certain.push(a.certified && b.certified);
-                        }
-                        None => alone.push(index),
-                    }
-                }
-                solver.follow_all(problem, &networks, &starts, |at, gains| {
-                    // Between two that are proved to be the lowest one is proved, too, or there is another.
-                    let proved = |gains: &Gains| gains.certified || !certain[at];
-                    match gains.filter(proved) {
-                        Some(gains) => each(followed[at], &gains)?,
-                        None => alone.push(followed[at]),
-                    }
-                    Ok(())
-                })?;
-            }
-        }
+            Place::Between(stretch) => self.follow(&stretch, problem, forms, solver, cancel, &mut each)?,
+        };
         let networks: Vec<Topology> = alone.iter().map(|&index| forms[index].clone()).collect();
         solver.solve_all(problem, &networks, Options::default(), |at, gains| each(alone[at], &gains))
+    }
+
+    /// Hands `each` the gains that the minima at both ends of a stretch lead to; which forms have to be searched for.
+    fn follow(
+        &self,
+        stretch: &Stretch,
+        problem: &Problem,
+        forms: &[Topology],
+        solver: &mut Synthesizer,
+        cancel: &CancelToken,
+        each: &mut impl FnMut(usize, &Gains) -> Result<(), Stopped>,
+    ) -> Result<Vec<usize>, Stopped> {
+        let (mut alone, wanted): (Vec<usize>, Vec<usize>) =
+            (0..forms.len()).partition(|&index| forms[index].is_complete());
+        let listed: Vec<Topology> = wanted.iter().map(|&index| forms[index].clone()).collect();
+        let before = self.at_anchor(stretch.low, None, &listed, solver, cancel)?;
+        let after = self.at_anchor(stretch.high, None, &listed, solver, cancel)?;
+        let (mut followed, mut networks, mut starts) = (Vec::new(), Vec::new(), Vec::new());
+        for ((&index, network), (a, b)) in wanted.iter().zip(listed).zip(before.iter().zip(&after)) {
+            match between(a, b, stretch.share)? {
+                Some(start) => {
+                    followed.push((index, a.certified && b.certified));
+                    networks.push(network);
+                    starts.push(start);
+                }
+                None => alone.push(index),
+            }
+        }
+        solver.follow_all(problem, &networks, &starts, |at, gains| {
+            let (index, certain) = followed[at];
+            // Between two that are proved to be the lowest one is proved, too, or there is another.
+            match gains.filter(|gains| gains.certified || !certain) {
+                Some(gains) => each(index, &gains)?,
+                None => alone.push(index),
+            }
+            Ok(())
+        })?;
+        Ok(alone)
     }
 
     /// The gains at an anchor, kept there as far as the budget goes; `problem` is the anchor's, where it is at hand.
@@ -228,80 +246,4 @@ fn between(a: &Gains, b: &Gains, share: f64) -> Result<Option<Vec<f64>>, Stopped
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::game::{Interaction, bank};
-    use crate::policy::DEFAULT_TABLE_BYTES;
-    use crate::synthesis::Start;
-
-    fn policy(interaction: Interaction) -> Policy {
-        let game = bank::paper_game(interaction, 0.5).expect("the paper's game");
-        Policy::new(game, DEFAULT_TABLE_BYTES, &CancelToken::new()).expect("an equilibrium")
-    }
-
-    fn gains(policy: &Policy, step: usize, form: &Topology) -> Gains {
-        policy.gains(step, form, None, &mut Synthesizer::new(), &CancelToken::new()).expect("memory")
-    }
-
-    #[test]
-    fn p_moves_little_from_anchor_to_anchor() {
-        for interaction in [Interaction::I1, Interaction::I2] {
-            let policy = policy(interaction);
-            let steps = &policy.anchors.steps;
-            assert_eq!((steps[0], steps[steps.len() - 1]), (0, policy.equilibrium.steps()));
-            for pair in steps.windows(2) {
-                let (a, b) = (pair[0], pair[1]);
-                assert!(a < b && b - a <= LONGEST);
-                assert!(b - a == 1 || !moved(&policy.equilibrium, a, b), "{a} to {b}");
-                let next = b + 1;
-                let more = b == policy.equilibrium.steps() || b - a == LONGEST || moved(&policy.equilibrium, a, next);
-                assert!(more, "{a} to {b} could be longer");
-            }
-            // Most instants lie between anchors.
-            assert!(4 * steps.len() < policy.equilibrium.steps(), "{}", steps.len());
-        }
-    }
-
-    /// Every network of the paper's games at some instants: the lowest minimum, for a few steps; bitwise the
-    /// same whatever was asked for before.
-    #[test]
-    fn what_is_followed_is_what_is_found_by_searching() {
-        for (interaction, every) in [(Interaction::I1, 5), (Interaction::I2, 97)] {
-            let (policy, other) = (policy(interaction), policy(interaction));
-            let (m, n) = (policy.game.constrained(), policy.game.size());
-            let (mut steps, mut searched, mut followed) = (0, 0, 0);
-            for key in (0..1u64 << (m * n)).step_by(every) {
-                let form = Topology::from_key(m, n, key);
-                let k = 1 + (key as usize * 37) % (policy.equilibrium.steps() - 1);
-                let found = gains(&policy, k, &form);
-                let (mut solver, cancel) = (Synthesizer::new(), CancelToken::new());
-                let alone = other.gains(k, &form, Some(Options::default()), &mut solver, &cancel).expect("memory");
-                assert!((found.theta - alone.theta).abs() <= 1e-9 * alone.theta + 1e-20, "{k} {form:?}");
-                assert_eq!(found.certified, alone.certified, "{k} {form:?}");
-                let far = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
-                assert!(far(&found.rows, &alone.rows) <= 1e-7 * norm(&alone.rows), "{k} {form:?}");
-                // Asked for in another order, from another instant of the same stretch.
-                gains(&other, k.saturating_sub(7), &form);
-                assert_eq!(gains(&other, k, &form), found, "{k} {form:?}");
-                if found.start == Start::Between {
-                    followed += 1;
-                    steps += found.iterations;
-                    searched += alone.iterations;
-                }
-            }
-            assert!(followed > 20 && steps <= 3 * followed && searched > 10 * steps, "{followed} {steps} {searched}");
-        }
-    }
-
-    /// An anchor's own gains are those of the search there.
-    #[test]
-    fn anchors_are_searched() {
-        let policy = policy(Interaction::I1);
-        let form = Topology::from_fn(3, 4, |i, j| i != j && (i + j) % 2 == 1);
-        for &k in &policy.anchors.steps[..4] {
-            let (mut solver, cancel) = (Synthesizer::new(), CancelToken::new());
-            let alone = policy.gains(k, &form, Some(Options::default()), &mut solver, &cancel).expect("memory");
-            assert_eq!(gains(&policy, k, &form), alone);
-        }
-    }
-}
+mod tests;

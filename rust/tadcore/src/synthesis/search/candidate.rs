@@ -1,7 +1,7 @@
 //! A network that is being solved: its variables, the best gains found so far, and the start that led to them.
 
 use crate::error::NoMemory;
-use crate::memory::copy;
+use crate::memory::{copy, within};
 use crate::simd::norm;
 use crate::synthesis::newton::{Incumbent, Owner, Reached, Variable, balance};
 
@@ -119,4 +119,20 @@ impl Candidate {
         }
         lower
     }
+}
+
+/// The most bytes that the matrices of one descent may take: past some 9,000 unknowns its factorisations, of which there
+/// are hundreds, would take minutes each.
+const MOST_BYTES: u64 = 4 << 30;
+/// Bytes for each pair of unknowns: a factor, and the Hessian's triangle.
+const PAIR_BYTES: u128 = 12;
+
+/// Refuses a candidate whose search would take too much memory, before anything is allocated for it.
+pub(crate) fn admit(candidate: &Candidate) -> Result<(), NoMemory> {
+    if candidate.complete {
+        return Ok(());
+    }
+    // Twice as many in doubled gains.
+    let unknowns = 2 * candidate.variables.len() as u128;
+    within("the synthesis of the gains under one network", PAIR_BYTES * unknowns.pow(2), MOST_BYTES)
 }

@@ -7,8 +7,10 @@
 //!
 //! Source: ours.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, Start};
 use super::moves::Moves;
+use super::stages::Search;
+use crate::error::Stopped;
 use crate::simd::norm;
 use crate::synthesis::theta::{Problem, TABULATED_UP_TO};
 
@@ -70,7 +72,8 @@ pub(crate) fn fits(problem: &Problem, candidate: &Candidate) -> Vec<Vec<f64>> {
             }
             let limit = WORTH * candidate.reached.value;
             let change: Vec<(usize, &[f64], f64)> = players.iter().map(|&i| (i, &fit.h[i * n..][..n], 1.0)).collect();
-            let start: Vec<f64> = fit.h.iter().enumerate().map(|(e, h)| h / best.root[e / n]).collect();
+            let mut start: Vec<f64> = fit.h.iter().enumerate().map(|(e, h)| h / best.root[e / n]).collect();
+            candidate.in_double(&mut start);
             let apart = |other: &Vec<f64>| -> bool {
                 let distance: f64 = other.iter().zip(&start).map(|(x, y)| (x - y) * (x - y)).sum();
                 distance.sqrt() > APART * norm(&start)
@@ -81,6 +84,22 @@ pub(crate) fn fits(problem: &Problem, candidate: &Candidate) -> Vec<Vec<f64>> {
         }
     }
     found
+}
+
+impl Search<'_> {
+    /// Descents from the fits of the candidates `open`; which they lead lower.
+    pub(super) fn search_fits(&mut self, candidates: &mut [Candidate], open: &[usize]) -> Result<Vec<usize>, Stopped> {
+        self.begin(1);
+        for &e in open {
+            for start in fits(self.problem, &candidates[e]) {
+                self.tasks.add(e, false, 0.0)?.copy_from_slice(&start);
+            }
+        }
+        let starts = vec![Start::Reversed; self.tasks.len()];
+        let lower = self.finish(candidates, starts)?;
+        self.certify(candidates, &lower)?;
+        Ok(lower)
+    }
 }
 
 impl<'a> Fit<'a> {

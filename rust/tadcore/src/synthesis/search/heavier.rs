@@ -1,36 +1,34 @@
-//! Where γ₁ dominates: another search with the other weights heavier, lowered to γ's own, and starts that fit GᵀRG to M.
+//! Where γ₁ dominates: another search with the other weights heavier, lowered to γ's own.
 //!
 //! With γ₁ far above the others Θ has valleys, on whose floors ‖GᵀRG − M‖ stays next to nothing while a row of √R·G
 //! turns into that of another player. Descents come down to a floor anywhere and follow it to the nearest dip. With
 //! heavier weights beside γ₁ the floors are no longer flat, and the search finds the dip that is the lowest there. From
 //! its end the weights are lowered by a factor of [`STEP`] at a time, each a few steps of Newton's method from the
-//! last. Then descents begin at the starts of [`fits`].
+//! last.
 
-use super::candidate::{Candidate, Start};
-use super::fits::fits;
+use super::candidate::Candidate;
 use super::stages::Search;
 use crate::error::Stopped;
 use crate::synthesis::newton::Reached;
 use crate::synthesis::theta::{Precisions, Problem};
 
 /// How far above the others γ₁ dominates; how many times heavier they are made at most; and by how much at a time they
-/// are lowered. Powers of four, of which roots are exact.
+/// are lowered. The last two are powers of four, of which roots are exact.
 const DOMINATES: f64 = 32.0;
 const MOST: f64 = 1024.0;
 const STEP: f64 = 4.0;
 
 impl Search<'_> {
-    /// More for the candidates that are not certified: where γ₁ dominates with heavier weights, and everywhere from fits.
-    pub(super) fn search_heavier(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
-        let problem = self.problem;
+    /// A second search for the candidates `open`, where γ₁ dominates; which it leads lower.
+    pub(super) fn search_heavier(
+        &mut self,
+        candidates: &mut [Candidate],
+        open: &[usize],
+    ) -> Result<Vec<usize>, Stopped> {
+        let (problem, mut lower) = (self.problem, Vec::new());
         let ratio = problem.dominance();
-        let open: Vec<usize> =
-            (0..candidates.len()).filter(|&e| !candidates[e].complete && !candidates[e].certified).collect();
-        if problem.is_large() || open.is_empty() {
-            return Ok(());
-        }
         if ratio < DOMINATES {
-            return self.fit(candidates, &open, Vec::new());
+            return Ok(lower);
         }
         let mut factors = vec![STEP];
         while let Some(factor) = factors.last().map(|last| last * STEP).filter(|&next| next <= MOST.min(ratio * STEP)) {
@@ -38,18 +36,9 @@ impl Search<'_> {
         }
         factors.reverse();
         let thetas: Vec<Precisions> = factors.iter().map(|&factor| problem.heavier(factor)).collect();
-        let mut lower = Vec::new();
         let heaviest = problem.with(thetas[0].clone());
         let mut others = open.iter().map(|&e| candidates[e].again()).collect::<Result<Vec<_>, _>>()?;
-        let mut search = Search {
-            problem: &heaviest,
-            limits: self.limits,
-            dispatcher: &mut *self.dispatcher,
-            tasks: &mut *self.tasks,
-            doubled: &mut *self.doubled,
-            workspace: &mut *self.workspace,
-        };
-        search.everywhere(&mut others)?;
+        self.of(&heaviest).everywhere(&mut others)?;
         for (&e, other) in open.iter().zip(&others) {
             let candidate = &mut candidates[e];
             candidate.iterations += other.iterations;
@@ -59,33 +48,7 @@ impl Search<'_> {
                 lower.push(e);
             }
         }
-        self.fit(candidates, &open, lower)
-    }
-
-    /// Descents from the fits of [`fits`]; those that led lower, and `lower` itself, go on to the end of the search.
-    fn fit(&mut self, candidates: &mut [Candidate], open: &[usize], mut lower: Vec<usize>) -> Result<(), Stopped> {
-        let problem = self.problem;
-        self.begin(1);
-        for &e in open {
-            for start in fits(problem, &candidates[e]) {
-                let point = self.tasks.add(e, false, 0.0)?;
-                point.copy_from_slice(&start);
-                candidates[e].in_double(point);
-            }
-        }
-        let starts = vec![Start::Reversed; self.tasks.len()];
-        let fitted = self.finish(candidates, starts)?;
-        self.certify(candidates, &fitted)?;
-        lower.extend(fitted);
-        lower.sort_unstable();
-        lower.dedup();
-        // One by one: the others stay as they are.
-        for e in lower {
-            let candidate = std::slice::from_mut(&mut candidates[e]);
-            self.polish(candidate)?;
-            self.refine(candidate)?;
-        }
-        Ok(())
+        Ok(lower)
     }
 }
 

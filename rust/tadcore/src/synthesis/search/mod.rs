@@ -37,6 +37,7 @@
 //! | `gradient` | the paper's gradient descent, as a second method |
 //! | `moves` | restarts from the best point: rows and gains reversed, rows exchanged |
 //! | `stages` | the stages above |
+//! | `continued` | Newton's method from near a minimum of another instant |
 //! | `large` | the same for large games |
 //! | `refine` | the end of the search where players differ by decades |
 //! | `fits` | starts that fit GᵀRG to M player by player |
@@ -45,6 +46,7 @@
 
 mod blocks;
 mod candidate;
+mod continued;
 mod fits;
 mod gradient;
 mod heavier;
@@ -56,8 +58,8 @@ mod stages;
 mod start;
 
 pub(crate) use blocks::covers_blocks;
-pub(crate) use candidate::Candidate;
 pub use candidate::Start;
+pub(crate) use candidate::{Candidate, admit};
 #[cfg(test)]
 pub(crate) use dispatch::Kind;
 pub(crate) use dispatch::{Dispatcher, SIDE_BY_SIDE_UP_TO};
@@ -66,8 +68,8 @@ pub(crate) use fits::fits;
 pub(crate) use gradient::descend;
 #[cfg(test)]
 pub(crate) use moves::Moves;
+pub(crate) use stages::Search;
 #[cfg(test)]
 pub(crate) use stages::{BASIN, DOUBLED_ITERATIONS, LONGEST_STEP, far_start};
-pub(crate) use stages::{Search, admit};
 pub(crate) use start::{canonical, paper_variables, variables};
 pub(crate) use tadcore_kernels::synthesis::search::dispatch;

@@ -18,6 +18,7 @@
 //! Source: ours.
 
 use super::candidate::Candidate;
+use super::dispatch::Kind;
 use super::stages::Search;
 use crate::cancel::CancelToken;
 use crate::error::Stopped;
@@ -46,6 +47,8 @@ const ROUNDED: [f64; 4] = [0.0, 1e-14, 1e-12, 1e-10];
 const ROUNDING: f64 = 1e-16;
 /// A weight on S, relative to Θ's parts, below which doubles do not show the slope along the valley that it makes.
 const UNSEEN: f64 = 1e-13;
+/// Iterations, at most, after the tolerance is met in a narrow valley.
+const POLISH: usize = 50;
 /// What asks for memory here.
 const WHAT: &str = "the last steps of the synthesis of one network";
 
@@ -94,6 +97,30 @@ impl Rows {
 }
 
 impl Search<'_> {
+    /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
+    /// long as the gradient falls.
+    pub(super) fn polish(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
+        self.begin(1);
+        for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| !candidate.quick) {
+            self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidate.g);
+        }
+        if self.tasks.len() == 0 {
+            return Ok(());
+        }
+        let limits = self.limits;
+        self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
+        self.descend(Kind::Real, candidates)?;
+        self.limits = limits;
+        for task in 0..self.tasks.len() {
+            let (candidate, reached) = (&mut candidates[self.tasks.owner(task)], self.tasks.reached(task));
+            candidate.iterations += reached.iterations;
+            if reached.gradient_norm < candidate.reached.gradient_norm {
+                candidate.take(candidate.start, self.tasks.point(task), reached);
+            }
+        }
+        Ok(())
+    }
+
     /// Where players differ much: Newton to the end for each of them. The relative gradient of a candidate is then the
     /// largest of a player, and says whether it has converged.
     pub(super) fn refine(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {

@@ -55,15 +55,7 @@ impl Search<'_> {
         let mut ends: Vec<Vec<End>> = candidates.iter().map(|_| Vec::new()).collect();
         for searched in [&without, &with_some] {
             let mut others = candidates.iter().map(Candidate::again).collect::<Result<Vec<_>, _>>()?;
-            let mut search = Search {
-                problem: searched,
-                limits: self.limits,
-                dispatcher: &mut *self.dispatcher,
-                tasks: &mut *self.tasks,
-                doubled: &mut *self.doubled,
-                workspace: &mut *self.workspace,
-            };
-            search.everywhere(&mut others)?;
+            self.of(searched).everywhere(&mut others)?;
             for ((candidate, other), ends) in candidates.iter_mut().zip(&mut others).zip(&mut ends) {
                 candidate.iterations += other.iterations;
                 candidate.left_out = candidate.left_out.max(other.left_out);

@@ -3,10 +3,9 @@
 use super::candidate::{BACK, Candidate, Start};
 use super::dispatch::{self, Dispatcher, Kind};
 use super::moves::Moves;
-use crate::error::{NoMemory, Stopped};
-use crate::memory;
+use crate::error::Stopped;
 use crate::simd::norm;
-use crate::synthesis::newton::{Limits, Owner, Status, Tasks, Workspace, advance};
+use crate::synthesis::newton::{Limits, Owner, Tasks, Workspace, advance};
 use crate::synthesis::theta::Problem;
 
 /// Size of the second part B at the start, relative to ‖F‖.
@@ -22,29 +21,6 @@ const SCREENING_ITERATIONS: usize = 60;
 const FLAT: f64 = 1e-6;
 /// Rounds of moves, each from the best point of the one before.
 pub(super) const ROUNDS: usize = 4;
-/// Steps that Newton's method may take from between two minima, how far, relative to the gains, it may lead, and the
-/// gradient aimed at: the last step is made for what a gradient within the tolerance leaves in a valley.
-const CONTINUED: usize = 5;
-const MOVED: f64 = 0.01;
-const CLOSE: f64 = 1e-15;
-/// Iterations, at most, after the tolerance is met in such a valley.
-const POLISH: usize = 50;
-
-/// The most bytes that the matrices of one descent may take: past some 9,000 unknowns its factorisations, of which there
-/// are hundreds, would take minutes each.
-const MOST_BYTES: u64 = 4 << 30;
-/// Bytes for each pair of unknowns: a factor, and the Hessian's triangle.
-const PAIR_BYTES: u128 = 12;
-
-/// Refuses a candidate whose search would take too much memory, before anything is allocated for it.
-pub(crate) fn admit(candidate: &Candidate) -> Result<(), NoMemory> {
-    if candidate.complete {
-        return Ok(());
-    }
-    // Twice as many in doubled gains.
-    let unknowns = 2 * candidate.variables.len() as u128;
-    memory::within("the synthesis of the gains under one network", PAIR_BYTES * unknowns.pow(2), MOST_BYTES)
-}
 
 /// What a search needs besides its candidates.
 pub(crate) struct Search<'a> {
@@ -71,7 +47,7 @@ impl Search<'_> {
         let faint = self.problem.faint();
         if faint.is_empty() {
             self.everywhere(candidates)?;
-            return self.search_heavier(candidates);
+            return self.further(candidates);
         }
         self.settle(candidates, &faint)?;
         // Where S has no weight at all, what is flat stays so.
@@ -93,6 +69,38 @@ impl Search<'_> {
         }
         self.polish(candidates)?;
         self.refine(candidates)
+    }
+
+    /// More for the candidates that are not certified: heavier weights where γ₁ dominates, then starts from fits.
+    fn further(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
+        let open: Vec<usize> =
+            (0..candidates.len()).filter(|&e| !candidates[e].complete && !candidates[e].certified).collect();
+        if self.problem.is_large() || open.is_empty() {
+            return Ok(());
+        }
+        let mut lower = self.search_heavier(candidates, &open)?;
+        lower.extend(self.search_fits(candidates, &open)?);
+        lower.sort_unstable();
+        lower.dedup();
+        // One by one: the others stay as they are.
+        for e in lower {
+            let candidate = std::slice::from_mut(&mut candidates[e]);
+            self.polish(candidate)?;
+            self.refine(candidate)?;
+        }
+        Ok(())
+    }
+
+    /// The same search of another Θ.
+    pub(super) fn of<'b>(&'b mut self, problem: &'b Problem) -> Search<'b> {
+        Search {
+            problem,
+            limits: self.limits,
+            dispatcher: &mut *self.dispatcher,
+            tasks: &mut *self.tasks,
+            doubled: &mut *self.doubled,
+            workspace: &mut *self.workspace,
+        }
     }
 
     /// The first descent of the candidates that are `complete`, or of the others.
@@ -137,71 +145,13 @@ impl Search<'_> {
         self.certify(candidates, &won)
     }
 
-    /// Newton's method from a point for each candidate, where a minimum of another instant was; whether it soon led to a
-    /// minimum near there.
-    pub(crate) fn continue_from(
-        &mut self,
-        candidates: &mut [Candidate],
-        starts: &[Vec<f64>],
-    ) -> Result<Vec<bool>, Stopped> {
-        self.begin(1);
-        for (e, (candidate, start)) in candidates.iter_mut().zip(starts).enumerate() {
-            candidate.g.copy_from_slice(start);
-            let point = self.tasks.add(e, false, 0.0)?;
-            point.copy_from_slice(start);
-            candidate.in_double(point);
-        }
-        let limits = self.limits;
-        self.limits = Limits { iterations: CONTINUED, tolerance: CLOSE, ..limits };
-        self.descend(Kind::Certified, candidates)?;
-        self.limits = limits;
-        let mut near = Vec::with_capacity(candidates.len());
-        for (e, candidate) in candidates.iter_mut().enumerate() {
-            let (point, reached) = (self.tasks.point(e), self.tasks.reached(e));
-            let moved: f64 = point.iter().zip(&candidate.g).map(|(x, y)| (x - y) * (x - y)).sum();
-            near.push(reached.status == Status::Converged && moved.sqrt() <= MOVED * norm(&candidate.g));
-            candidate.take(Start::Between, point, reached);
-            candidate.iterations = reached.iterations;
-            candidate.certified = self.tasks.certified(e);
-            candidate.quick = true;
-        }
-        self.refine(candidates)?;
-        let still = |candidate: &Candidate| candidate.reached.status == Status::Converged;
-        near.iter_mut().zip(candidates.iter()).for_each(|(near, candidate)| *near &= still(candidate));
-        Ok(near)
-    }
-
-    /// In a narrow valley a gradient within the tolerance still leaves the gains uncertain: Newton goes on there for as
-    /// long as the gradient falls.
-    pub(super) fn polish(&mut self, candidates: &mut [Candidate]) -> Result<(), Stopped> {
-        self.begin(1);
-        for (e, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| !candidate.quick) {
-            self.tasks.add(e, false, 0.0)?.copy_from_slice(&candidate.g);
-        }
-        if self.tasks.len() == 0 {
-            return Ok(());
-        }
-        let limits = self.limits;
-        self.limits = Limits { iterations: POLISH, tolerance: 0.0, ..limits };
-        self.descend(Kind::Real, candidates)?;
-        self.limits = limits;
-        for task in 0..self.tasks.len() {
-            let (candidate, reached) = (&mut candidates[self.tasks.owner(task)], self.tasks.reached(task));
-            candidate.iterations += reached.iterations;
-            if reached.gradient_norm < candidate.reached.gradient_norm {
-                candidate.take(candidate.start, self.tasks.point(task), reached);
-            }
-        }
-        Ok(())
-    }
-
     /// Empties the list for points of as many copies of the gains.
     pub(super) fn begin(&mut self, copies: usize) {
         self.tasks.clear(self.problem.rows * self.problem.size, copies);
     }
 
     /// Makes the listed descents, without incumbents.
-    fn descend(&mut self, kind: Kind, candidates: &[Candidate]) -> Result<(), Stopped> {
+    pub(super) fn descend(&mut self, kind: Kind, candidates: &[Candidate]) -> Result<(), Stopped> {
         let owners: Vec<Owner> =
             candidates.iter().map(|e| Owner { variables: &e.variables, incumbent: None }).collect();
         self.dispatcher.run(kind, &self.problem.theta, self.tasks, &owners, self.limits)
