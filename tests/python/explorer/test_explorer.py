@@ -355,40 +355,46 @@ def test_only_this_machine_is_answered(address):
         assert wanted in ask(port, *upgrade, *lines)[0], lines
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-@pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_in_a_real_browser(address, tmp_path):
+@pytest.fixture
+def view(address):
+    """The page in a real browser, in which no script may fail."""
     api = pytest.importorskip("playwright.sync_api")
     with api.sync_playwright() as play:
         browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        view = browser.new_page(viewport={"width": 1340, "height": 900})
+        opened = browser.new_page(viewport={"width": 1340, "height": 900})
         trouble = []
-        view.on("pageerror", lambda error: trouble.append(str(error)))
-        view.goto(address)
-        view.get_by_text("d1 intercepts the attacker at t = 1.395").wait_for(timeout=20_000)
-        view.wait_for_function("Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
-        spot = """([x, y]) => {
-            const plot = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name('arena'));
-            const box = plot.el.getBoundingClientRect();
-            return [box.x + plot.frame.x_scale.compute(x), box.y + plot.frame.y_scale.compute(y)];
-        }"""
-        x, y = view.evaluate(spot, [1.0, 1.5])
-        to_x, to_y = view.evaluate(spot, [1.5, -0.5])
-        view.mouse.move(x, y)
-        view.mouse.down()
-        view.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=5)
-        view.mouse.move(to_x, to_y, steps=5)
-        said = "Bokeh.documents[0].get_model_by_name('status').text"
-        there = tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (1.5, -0.5)})
-        expected = f"<b>{tadcore.simulate(there).outcome}</b>"
-        view.wait_for_function(f"{said} === '{expected}'", timeout=20_000)
-        during = view.evaluate(said)
-        view.mouse.up()
-        with view.expect_download() as caught:
-            view.get_by_text("Scenario as TOML").click()
-        caught.value.save_as(tmp_path / "mine.toml")
+        opened.on("pageerror", lambda error: trouble.append(str(error)))
+        opened.goto(address)
+        yield opened
         browser.close()
     assert trouble == []
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_in_a_real_browser(view, tmp_path):
+    view.get_by_text("d1 intercepts the attacker at t = 1.395").wait_for(timeout=20_000)
+    view.wait_for_function("Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
+    spot = """([x, y]) => {
+        const plot = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name('arena'));
+        const box = plot.el.getBoundingClientRect();
+        return [box.x + plot.frame.x_scale.compute(x), box.y + plot.frame.y_scale.compute(y)];
+    }"""
+    x, y = view.evaluate(spot, [1.0, 1.5])
+    to_x, to_y = view.evaluate(spot, [1.5, -0.5])
+    view.mouse.move(x, y)
+    view.mouse.down()
+    view.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=5)
+    view.mouse.move(to_x, to_y, steps=5)
+    said = "Bokeh.documents[0].get_model_by_name('status').text"
+    there = tadcore.scenarios.load("paper-i1").replace({"defenders[1].position": (1.5, -0.5)})
+    expected = f"<b>{tadcore.simulate(there).outcome}</b>"
+    view.wait_for_function(f"{said} === '{expected}'", timeout=20_000)
+    during = view.evaluate(said)
+    view.mouse.up()
+    with view.expect_download() as caught:
+        view.get_by_text("Scenario as TOML").click()
+    caught.value.save_as(tmp_path / "mine.toml")
     moved = tadcore.Scenario.from_toml(tmp_path / "mine.toml")
     assert moved.defenders[1].position == pytest.approx((1.5, -0.5), abs=0.02)
     assert str(tadcore.simulate(moved).outcome) in during, "the outcome is there before the mouse is let go"
@@ -403,60 +409,51 @@ def read(view, name, wanted):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
-def test_keys_maps_files_and_narrow_windows_in_a_real_browser(address, tmp_path):
-    api = pytest.importorskip("playwright.sync_api")
+def test_keys_maps_files_and_narrow_windows_in_a_real_browser(view, tmp_path):
     start = tadcore.scenarios.load("paper-i1")
-    with api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        view = browser.new_page(viewport={"width": 1340, "height": 900})
-        trouble = []
-        view.on("pageerror", lambda error: trouble.append(str(error)))
-        view.goto(address)
-        view.wait_for_function("window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
-        for key in ("ArrowRight", "ArrowRight", "Shift+ArrowDown"):
-            view.keyboard.press(key)
-        moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5)})).outcome
-        read(view, "status", f"^<b>{moved}</b>$")
-        view.keyboard.press("n")
-        view.keyboard.press("ArrowUp")
-        moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05)})).outcome
-        read(view, "status", f"^<b>{moved}</b>$")
-        time = "Bokeh.documents[0].get_model_by_name('play').active"
-        view.keyboard.press(" ")
-        view.wait_for_function(time)
-        view.keyboard.press(" ")
-        view.wait_for_function(f"!{time}")
-        view.get_by_text("outcome map", exact=True).click()
-        read(view, "map", r"^by the start of d1: .*by d\d$")
-        view.keyboard.press(" ")  # what was clicked does not keep the space bar
-        view.wait_for_function(time)
-        view.keyboard.press(" ")
-        chooser = view.locator("select").nth(1)
-        chooser.click()
-        chooser.select_option("d3")  # nor does a list keep the arrows
-        view.keyboard.press("ArrowUp")
-        moved = {"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05), "d3.position": (-1.0, 0.05)}
-        read(view, "status", f"^<b>{tadcore.simulate(start.replace(moved)).outcome}</b>$")
-        chooser.focus()
-        view.keyboard.press("Home")  # but with the keyboard it does
-        read(view, "map", r"^by the start of d1: ")
-        view.get_by_text("certified map", exact=True).click()
-        read(view, "map", r"proved: \d+\.\d % of the area so far$")
-        view.get_by_text("certified map", exact=True).click()
-        read(view, "map", r"^by the start of d1: .*by d\d$")
-        mine = tmp_path / "mine.toml"
-        given = start.replace({"horizon": 1.0})
-        for text, said in (
-            (given.to_toml(), f"^<b>{tadcore.simulate(given).outcome}</b>$"),
-            (given.to_toml().replace("horizon = 1.0", "horizon = -1.0"), "horizon: got -1.0, must be"),
-        ):
-            mine.write_text(text, encoding="utf-8")
-            view.locator("input[type=file]").set_input_files(mine)
-            read(view, "status", said)
-        view.set_viewport_size({"width": 420, "height": 900})
-        view.wait_for_function("document.documentElement.scrollWidth <= 421")
-        browser.close()
-    assert trouble == []
+    view.wait_for_function("window.Bokeh && Bokeh.documents.length > 0 && Bokeh.documents[0].is_idle")
+    for key in ("ArrowRight", "ArrowRight", "Shift+ArrowDown"):
+        view.keyboard.press(key)
+    moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5)})).outcome
+    read(view, "status", f"^<b>{moved}</b>$")
+    view.keyboard.press("n")
+    view.keyboard.press("ArrowUp")
+    moved = tadcore.simulate(start.replace({"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05)})).outcome
+    read(view, "status", f"^<b>{moved}</b>$")
+    time = "Bokeh.documents[0].get_model_by_name('play').active"
+    view.keyboard.press(" ")
+    view.wait_for_function(time)
+    view.keyboard.press(" ")
+    view.wait_for_function(f"!{time}")
+    view.get_by_text("outcome map", exact=True).click()
+    read(view, "map", r"^by the start of d1: .*by d\d$")
+    view.keyboard.press(" ")  # what was clicked does not keep the space bar
+    view.wait_for_function(time)
+    view.keyboard.press(" ")
+    chooser = view.locator("select").nth(1)
+    chooser.click()
+    chooser.select_option("d3")  # nor does a list keep the arrows
+    view.keyboard.press("ArrowUp")
+    moved = {"attacker.position": (-1.9, 1.5), "d1.position": (0.0, 0.05), "d3.position": (-1.0, 0.05)}
+    read(view, "status", f"^<b>{tadcore.simulate(start.replace(moved)).outcome}</b>$")
+    chooser.focus()
+    view.keyboard.press("Home")  # but with the keyboard it does
+    read(view, "map", r"^by the start of d1: ")
+    view.get_by_text("certified map", exact=True).click()
+    read(view, "map", r"proved: \d+\.\d % of the area so far$")
+    view.get_by_text("certified map", exact=True).click()
+    read(view, "map", r"^by the start of d1: .*by d\d$")
+    mine = tmp_path / "mine.toml"
+    given = start.replace({"horizon": 1.0})
+    for text, said in (
+        (given.to_toml(), f"^<b>{tadcore.simulate(given).outcome}</b>$"),
+        (given.to_toml().replace("horizon = 1.0", "horizon = -1.0"), "horizon: got -1.0, must be"),
+    ):
+        mine.write_text(text, encoding="utf-8")
+        view.locator("input[type=file]").set_input_files(mine)
+        read(view, "status", said)
+    view.set_viewport_size({"width": 420, "height": 900})
+    view.wait_for_function("document.documentElement.scrollWidth <= 421")
 
 
 def test_the_page_is_served_to_this_machine(address):

@@ -92,7 +92,7 @@ impl<'a> Chunk<'a> {
             w.waiting.clear();
             self.trials.fail(k);
             if let Some(scores) = &mut scores {
-                scores.look(&mut self.trials, k, ends);
+                scores.observe(&mut self.trials, k, ends);
             }
             if let Some(watch) = &mut watch {
                 watch.note(&self.trials);

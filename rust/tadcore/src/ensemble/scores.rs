@@ -94,10 +94,10 @@ impl<'a> Scores<'a> {
     }
 
     /// Takes in the state at t_k, ends what is over there, and takes out those whose numbers end.
-    pub(super) fn look(&mut self, trials: &mut Trials, k: usize, ends: &mut [End]) {
+    pub(super) fn observe(&mut self, trials: &mut Trials, k: usize, ends: &mut [End]) {
         let (dim, width) = (trials.shape.dim, trials.shape.size * trials.shape.dim);
         let mut now = Distances::new(self.n + 1);
-        // From the last block down, so that a trial that moves in has been looked at.
+        // From the last block down, so that a trial that moves in has been observed.
         for block in (0..trials.blocks.live.div_ceil(BLOCK)).rev() {
             let z = &trials.blocks.z[block * width..][..width];
             let radii = &self.radii[block * (self.n + 1)..][..self.n + 1];
@@ -200,7 +200,7 @@ impl<'a> Scores<'a> {
 
     /// The trials that are left at T: what is not over is out of time.
     pub(super) fn finish(mut self, trials: &mut Trials, last: usize, ends: &mut [End]) {
-        self.look(trials, last, ends);
+        self.observe(trials, last, ends);
         for place in 0..trials.blocks.live {
             self.write(trials, place, last);
         }
