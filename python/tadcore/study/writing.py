@@ -92,7 +92,7 @@ class Writer:
         for run in _runs(rows):
             first, end = run.start * CHUNK, run[-1] * CHUNK + rows[run[-1]]
             part = Part(store.folder / name_of(first, end), first, end)
-            if part not in store.files or any(chunk in chunks for chunk in run):
+            if part not in store.files:  # its name says what is in it
                 table = pa.concat_tables(self._tables(run, chunks))
                 write(part.path, store.format.bytes(first, table))
             store.files.add(part)
