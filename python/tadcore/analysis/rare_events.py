@@ -32,7 +32,7 @@ def rare(
 
     Games are ranked by how far they were from the event (`Batch.scores`); a pilot finds levels of that score, each
     reached by a tenth of the games that reach the one before, and independent replications then multiply these shares:
-    an unbiased estimate, and a spread that says how good it is.
+    each an unbiased estimate, and their spread says how good the mean is.
 
     Parameters
     ----------
