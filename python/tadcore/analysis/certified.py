@@ -26,7 +26,7 @@ from .loading import TITLE
 
 _TOGETHER = 1 << 13  # cells after which the keyboard is read and the progress bar moves
 _MOST_CELLS = 10**9
-_FINE = 1024  # cells along the longer side by default, at their least
+_FINE = 2048  # cells along the longer side by default, at their least
 
 
 @public
@@ -55,7 +55,7 @@ def certified_map(
     x, y : (low, high)
         The region of its starts.
     resolution : float, optional
-        The least side of a box; a 1024th of the region's longer side by default.
+        The least side of a box; a 2048th of the region's longer side by default.
     budget : int
         Boxes to look at, at most; larger ones come first. It bounds the work and the memory: some 300 bytes a box for
         three defenders, more with the square of their number.

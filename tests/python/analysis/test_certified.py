@@ -48,6 +48,12 @@ def test_no_start_contradicts_a_proof(found):
     assert contradictions(found, 50_000) == 0
 
 
+def test_nearly_all_of_full_sight_is_proved_unasked():
+    whole = certified_map(tadcore.scenarios.load("paper-i1-full"), x=(-3, 3), y=(-3, 3))
+    assert whole.proved > 0.995
+    assert contradictions(whole, 100_000) == 0
+
+
 @pytest.mark.parametrize(
     ("sc", "player", "least"), [(LIMITED, "attacker", 0.1), (LIMITED, "d2", 0.1), (TEAM, "target", 0.02)]
 )
