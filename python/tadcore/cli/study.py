@@ -72,8 +72,9 @@ def study(
     """
     from tadcore.statistics.outcomes import excluding
     from tadcore.study.manifest import Manifest
-    from tadcore.study.part import as_part, folder_of
+    from tadcore.study.part import as_part, place_of
     from tadcore.study.study import Study
+    from tadcore.study.where import as_place
 
     hush(quiet or as_json)
     if str(file) == STDIN:
@@ -82,7 +83,7 @@ def study(
         wanted = Study.from_toml(file)
     which = None if part is None else as_part(_numbers(part))
     if resume:
-        Manifest.read(folder_of(which, store))
+        Manifest.read(place_of(which, as_place("--store", store)))
     options: dict[str, Any] = {
         "progress": progress and not hushed(),
         "store": store,

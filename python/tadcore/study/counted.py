@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import re
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tadcore._shared.files import MOST, strange
+from tadcore._shared.files import MOST
 from tadcore.errors import StoreError
 from tadcore.game.outcome import UNPLAYED, OutcomeKind
 from tadcore.statistics.tally import Tally
 
-from .manifest import faults
+from .place import Place
 from .plan import Plan
 from .table import outcome_names
 
@@ -39,19 +38,23 @@ class Counted(NamedTuple):
     @property
     def name(self) -> str:
         """The name of its file."""
-        return f"counts-{self.first:010d}-{self.end:010d}.parquet"
+        return _name_of(self.first, self.end)
 
 
-def ranges_in(folder: Path) -> list[tuple[int, int, Path]]:
-    """The files of counts in a folder, by the first trial and then the largest first."""
+def _name_of(first: int, end: int) -> str:
+    return f"counts-{first:010d}-{end:010d}.parquet"
+
+
+def ranges_in(place: Place) -> list[tuple[int, int, str]]:
+    """The files of counts of a place: first trial, end and name, by the first and then the largest first."""
     found = []
-    with faults(folder):
-        paths = sorted(folder.glob("counts-*.parquet"))
-    for path in paths:
-        match = _NAME.fullmatch(path.name)
+    for name in place.names():
+        if not (name.startswith("counts-") and name.endswith(".parquet")):
+            continue
+        match = _NAME.fullmatch(name)
         if match is None or int(match[1]) >= int(match[2]):
-            raise StoreError(str(path), "its name is not that of a file of counts", "move it out of this folder")
-        found.append((int(match[1]), int(match[2]), path))
+            raise StoreError(place.at(name), "its name is not that of a file of counts", "move it out of this folder")
+        found.append((int(match[1]), int(match[2]), name))
     return sorted(found, key=lambda entry: (entry[0], -entry[1]))
 
 
@@ -78,16 +81,19 @@ def content_of(counted: Counted, plan: Plan, study: str) -> memoryview:
     return memoryview(sink.getvalue())
 
 
-def read_counts(path: Path, first: int, end: int, plan: Plan, study: str) -> Counted:
-    """A file of counts, verified; raises `StoreError`."""
+def read_counts(place: Place, first: int, end: int, plan: Plan, study: str) -> Counted:
+    """The counts of the trials from ``first`` to before ``end``, verified; raises `StoreError`."""
     sc = plan.scenario
-    found = strange(path)
+    name = _name_of(first, end)
+    path = place.at(name)
+    found = place.strange(name)
     if found is not None:
-        raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
+        raise StoreError(path, f"it is {found}, not a file", "move it out of this folder")
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError(f"it has more than {_LARGEST >> 20} MiB")
-        with pq.ParquetFile(path, page_checksum_verification=True) as opened:
+        with place.source(name) as source:
+            if source.size() > _LARGEST:
+                raise ValueError(f"it has more than {_LARGEST >> 20} MiB")
+            opened = pq.ParquetFile(source, page_checksum_verification=True)
             about = opened.metadata.metadata or {}
             table = opened.read()
         keys = ("study", "first", "end", "sha256")
@@ -99,16 +105,16 @@ def read_counts(path: Path, first: int, end: int, plan: Plan, study: str) -> Cou
         code = np.where(kind == UNPLAYED, OutcomeKind.INTERCEPTED + sc.n, code)
         cells = (2 * code + table["diverged"].to_numpy()) * (sc.steps + 1) + step
     except (OSError, ValueError, KeyError, pa.ArrowException) as error:
-        raise StoreError(str(path), f"it is damaged ({error})", _AGAIN) from None
+        raise StoreError(path, f"it is damaged ({error})", _AGAIN) from None
     if said["study"] != study:
-        raise StoreError(str(path), "it belongs to another study", "move it out of this folder, or name another store")
+        raise StoreError(path, "it belongs to another study", "move it out of this folder, or name another store")
     tally = Tally(sc.n, sc.steps, cells, trials)
     last = 2 * (len(OutcomeKind) + sc.n) * (sc.steps + 1)
     whole = cells.size and cells[0] >= 0 and cells[-1] < last and (np.diff(cells) > 0).all() and (trials > 0).all()
     if not whole or (said["first"], said["end"], said["sha256"]) != (str(first), str(end), _digest(tally)):
-        raise StoreError(str(path), "it is damaged (its counts are not those that were written)", _AGAIN)
+        raise StoreError(path, "it is damaged (its counts are not those that were written)", _AGAIN)
     if tally.trials != end - first:
-        raise StoreError(str(path), f"it counts {tally.trials:,} trials, and its name says {end - first:,}", _AGAIN)
+        raise StoreError(path, f"it counts {tally.trials:,} trials, and its name says {end - first:,}", _AGAIN)
     return Counted(first, end, tally)
 
 

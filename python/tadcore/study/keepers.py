@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any, Protocol
 
 import pyarrow as pa
@@ -16,10 +15,9 @@ from tadcore.statistics.tally import Tally
 
 from .counted import Counted, content_of, ranges_in, read_counts
 from .keeping import Keep
-from .manifest import faults
 from .plan import Plan, Played, Task
 from .rows import EAGER, Counts, InMemory, InStore, Rows
-from .store import Store, write
+from .store import Store
 from .table import schema_of, table_of, tally_of
 from .writing import Writer
 
@@ -69,7 +67,7 @@ class RowKeeper:
     @property
     def place(self) -> str | None:
         """The folder of the store."""
-        return None if self._store is None else str(self._store.folder)
+        return None if self._store is None else str(self._store.place)
 
     def begin(self, chunks: range, rule: dict[str, Any] | None) -> list[int]:
         """What no part has."""
@@ -144,7 +142,7 @@ class CountKeeper:
     @property
     def place(self) -> str | None:
         """The folder of the store."""
-        return None if self._store is None else str(self._store.folder)
+        return None if self._store is None else str(self._store.place)
 
     def begin(self, chunks: range, rule: dict[str, Any] | None) -> list[int]:
         """What comes after the trials that are counted, unless the rule was not asked after every chunk of these."""
@@ -158,14 +156,14 @@ class CountKeeper:
     def _read(self, last: int) -> None:
         store = self._store
         assert store is not None
-        there = [entry for entry in ranges_in(store.folder) if entry[0] == self._first]
+        there = [entry for entry in ranges_in(store.place) if entry[0] == self._first]
         if not there:
             return
-        _, end, path = there[0]
+        _, end, name = there[0]
         if end > last:
             found = f"it counts {end:,} trials, of which the first {last:,} cannot be told from the others"
-            raise StoreError(str(path), found, "ask for as many trials, or name another folder")
-        counted = read_counts(path, self._first, end, self._plan, store.manifest.study)
+            raise StoreError(store.place.at(name), found, "ask for as many trials, or name another folder")
+        counted = read_counts(store.place, self._first, end, self._plan, store.manifest.study)
         self._tally, self._end = counted.tally, end
         rest = end % CHUNK
         if rest and end < last:  # the cut chunk is played whole this time
@@ -197,13 +195,12 @@ class CountKeeper:
         if self._store is None or self._end <= self._first:
             return
         counted = Counted(self._first, self._end, self._tally)
-        path = self._store.folder / counted.name
-        if not path.exists():
-            write(path, content_of(counted, self._plan, self._store.manifest.study))
-        for first, end, older in ranges_in(self._store.folder):
+        place = self._store.place
+        if not place.exists(counted.name):
+            place.write(counted.name, content_of(counted, self._plan, self._store.manifest.study))
+        for first, end, older in ranges_in(place):
             if first == self._first and end < self._end:
-                with faults(older):
-                    older.unlink()
+                place.remove(older)
 
     def stop(self, trials: int | None, rule: dict[str, Any] | None) -> None:
         """In the manifest."""
@@ -227,11 +224,11 @@ def rows_there(store: Store, wanted: int) -> Rows:
     """The trials of a store before the first that is missing, and of these so many at most."""
     plan = store.plan
     if store.keep == "counts":
-        there = [entry for entry in ranges_in(store.folder) if entry[0] == 0 and entry[1] <= wanted]
+        there = [entry for entry in ranges_in(store.place) if entry[0] == 0 and entry[1] <= wanted]
         if not there:
             return Counts(Tally.empty(plan.scenario.n, plan.scenario.steps))
-        first, end, path = there[0]
-        return Counts(read_counts(path, first, end, plan, store.manifest.study).tally)
+        first, end, _ = there[0]
+        return Counts(read_counts(store.place, first, end, plan, store.manifest.study).tally)
     trials = chunk = 0
     while trials < wanted and trials == chunk * CHUNK and store.rows(chunk):
         trials = min(trials + store.rows(chunk), wanted)
@@ -243,9 +240,9 @@ def rows_there(store: Store, wanted: int) -> Rows:
 def checks_of(store: Store) -> list[Callable[[], int]]:
     """What reads each file of a store, and says how many trials it has; raises `StoreError` for a damaged one."""
     if store.keep == "counts":
-        return [partial(_counted, store, *entry) for entry in ranges_in(store.folder)]
+        return [partial(_counted, store, first, end) for first, end, _ in ranges_in(store.place)]
     return [partial(store.format.verify, part) for part in sorted(store.files)]
 
 
-def _counted(store: Store, first: int, end: int, path: Path) -> int:
-    return read_counts(path, first, end, store.plan, store.manifest.study).tally.trials
+def _counted(store: Store, first: int, end: int) -> int:
+    return read_counts(store.place, first, end, store.plan, store.manifest.study).tally.trials

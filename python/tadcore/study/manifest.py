@@ -6,25 +6,24 @@ another study.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib import metadata
-from pathlib import Path
 from typing import Any, TypeVar
 
 from tadcore import _core
-from tadcore._shared.files import MOST, strange
+from tadcore._shared.files import MOST
 from tadcore.errors import StoreError, shorten
 from tadcore.sampling.adapters import as_plain, from_plain
 from tadcore.sampling.design import CHUNK, STREAM
 from tadcore.simulation.termination import Termination, as_termination
 
 from .keeping import Keep, as_keep
+from .place import Place, reason
+from .where import as_place
 
 Kind = TypeVar("Kind")
 
@@ -123,7 +122,7 @@ class Manifest:
             content["rule"] = self.rule
         return json.dumps(content | {SEAL: seal(content)}, indent=2, ensure_ascii=False) + "\n"
 
-    def same(self, wanted: Manifest, place: Path) -> None:
+    def same(self, wanted: Manifest, place: Place) -> None:
         """Raise `StoreError` where this is not the manifest of the study that is wanted, or of what it keeps."""
         if self.study != wanted.study:
             decides = ("scenario", "vary", "seed", "design", "chunk", "stream", "termination", "passes")
@@ -134,23 +133,23 @@ class Manifest:
             raise StoreError(str(place), found, f"name another folder, or run with keep={self.keep!r}")
 
     @classmethod
-    def read(cls, folder: str | os.PathLike[str]) -> Manifest:
+    def read(cls, folder: Place | str | os.PathLike[str]) -> Manifest:
         """The manifest of a store; raises `StoreError` where there is none that can be read."""
-        path = Path(folder) / MANIFEST
+        place = as_place("folder", folder)
+        path = place.at(MANIFEST)
+        refuse_old(place)
         try:
-            refuse_old(Path(folder))
-            found = strange(path)
+            found = place.strange(MANIFEST) if place.exists(MANIFEST) else None
             if found is not None:
-                raise StoreError(str(path), f"it is {found}, not a file", "name the folder of a study")
-            with path.open("rb") as stream:
-                data = stream.read(MOST + 1)
+                raise StoreError(path, f"it is {found}, not a file", "name the folder of a study")
+            data = place.read(MANIFEST, MOST + 1)
         except FileNotFoundError:
-            raise StoreError(str(path), "there is no such file", "name the folder of a study") from None
+            raise StoreError(path, "there is no such file", "name the folder of a study") from None
         except OSError as error:
-            raise StoreError(str(path), f"it cannot be read ({reason(error)})", "check the path") from None
+            raise StoreError(path, f"it cannot be read ({reason(error)})", "check the path") from None
         if len(data) > MOST:
-            raise StoreError(str(path), f"it has more than {MOST >> 20} MiB", "name the folder of a study")
-        return cls.from_json(data, str(path))
+            raise StoreError(path, f"it has more than {MOST >> 20} MiB", "name the folder of a study")
+        return cls.from_json(data, path)
 
     @classmethod
     def from_json(cls, data: bytes, path: str) -> Manifest:
@@ -190,10 +189,10 @@ class Manifest:
         return manifest
 
 
-def refuse_old(folder: Path) -> None:
+def refuse_old(place: Place) -> None:
     """Raise `StoreError` for a store of an earlier format."""
-    if (folder / _OLD).exists() and not (folder / MANIFEST).exists():
-        raise _other_format(str(folder / _OLD), "1 or 2")
+    if place.exists(_OLD) and not place.exists(MANIFEST):
+        raise _other_format(place.at(_OLD), "1 or 2")
 
 
 def _other_format(path: str, number: str) -> StoreError:
@@ -208,22 +207,6 @@ def environment() -> dict[str, str]:
     """What else the last bit of a draw may depend on."""
     packages = {name: metadata.version(name) for name in ("numpy", "scipy", "pyarrow")}
     return {"machine": platform.platform(), "python": platform.python_version(), **packages}
-
-
-@contextlib.contextmanager
-def faults(path: Path) -> Iterator[None]:
-    """What the operating system refuses, in the words of a store."""
-    try:
-        yield
-    except OSError as error:
-        found = f"it cannot be written or read ({reason(error)})"
-        remedy = "nothing that was finished is lost: make room or name a folder that can be written, and run again"
-        raise StoreError(str(path), found, remedy) from error
-
-
-def reason(error: OSError) -> str:
-    """What the operating system says, without the path."""
-    return error.strerror or str(error)
 
 
 def _entry(content: dict[str, Any], name: str, kind: type[Kind]) -> Kind:

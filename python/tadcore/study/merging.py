@@ -6,17 +6,15 @@ import contextlib
 import os
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
-from tadcore._shared.files import as_path
 from tadcore.errors import StoreError
 
 from .counted import Counted, content_of, ranges_in, read_counts
 from .keepers import rows_there
-from .lock import LOCK, alone
-from .manifest import MANIFEST, Manifest, faults
+from .manifest import MANIFEST, Manifest
 from .reading import opened
-from .store import Store, write
+from .store import Store
+from .where import as_place
 from .writing import Writer
 
 _PART = re.compile(r"_part-(\d{5})-of-(\d{5})")
@@ -62,31 +60,30 @@ def merge_store(folder: str | os.PathLike[str]) -> Merged:
     StoreError
         There are no parts, one is of another study or still being written, or a file is damaged.
     """
-    place = as_path("folder", folder)
-    found = sorted(path for path in place.glob("_part-*") if path.is_dir() and _PART.fullmatch(path.name))
+    place = as_place("folder", folder)
+    names = [name for name in place.names() if _PART.fullmatch(name)]
+    found = [place.inside(name) for name in names]
     if not found:
         raise StoreError(str(place), "it holds no parts of a study", "run them with part=(i, n) and this store")
-    manifests = [Manifest.read(path) for path in found]
+    manifests = [Manifest.read(part) for part in found]
     first = manifests[0]
-    for manifest, path in zip(manifests, found, strict=True):
-        manifest.same(first, path)
+    for manifest, part in zip(manifests, found, strict=True):
+        manifest.same(first, part)
         if manifest.trials != first.trials:
-            asked = f"it is of a study of {manifest.trials:,} trials, and {found[0].name} of one of {first.trials:,}"
-            raise StoreError(str(path), asked, "run all parts with as many trials")
+            asked = f"it is of a study of {manifest.trials:,} trials, and {names[0]} of one of {first.trials:,}"
+            raise StoreError(str(part), asked, "run all parts with as many trials")
     plan = opened(found[0])[0].plan
     with contextlib.ExitStack() as until_the_end:
-        store = until_the_end.enter_context(Store.writing(place, first, plan))
-        for path in found:
-            until_the_end.enter_context(alone(path))
-        for path in found:
-            for one in sorted(path.glob("[!_.]*.parquet")):
-                with faults(one):
-                    one.replace(place / one.name)
-    for path in found:
-        with faults(path):
-            for left in (MANIFEST, LOCK):
-                (path / left).unlink(missing_ok=True)
-            path.rmdir()
+        until_the_end.enter_context(Store.writing(place, first, plan))
+        for part in found:
+            until_the_end.enter_context(part.alone())
+        for part in found:
+            for name in part.names():
+                if name.endswith(".parquet") and not name.startswith(("_", ".")):
+                    place.take(name, part)
+    for part in found:
+        part.remove(MANIFEST)
+        part.discard()
     with Store.writing(place, first, plan) as store:
         if store.keep == "counts":
             _add_up(store)
@@ -97,21 +94,18 @@ def merge_store(folder: str | os.PathLike[str]) -> Merged:
 
 def _add_up(store: Store) -> None:
     """One file of counts for the files that follow one another."""
-    files = ranges_in(store.folder)
     counted: Counted | None = None
-    merged: list[Path] = []
-    for first, end, path in files:
+    merged: list[str] = []
+    for first, end, name in ranges_in(store.place):
         if counted is not None and end <= counted.end:
-            merged.append(path)  # among those that are counted already
+            merged.append(name)  # among those that are counted already
         elif first == (0 if counted is None else counted.end):
-            more = read_counts(path, first, end, store.plan, store.manifest.study)
+            more = read_counts(store.place, first, end, store.plan, store.manifest.study)
             counted = more if counted is None else Counted(0, end, counted.tally + more.tally)
-            merged.append(path)
+            merged.append(name)
     if counted is None or len(merged) == 1:
         return
-    whole = store.folder / counted.name
-    write(whole, content_of(counted, store.plan, store.manifest.study))
-    for path in merged:
-        if path != whole:
-            with faults(path):
-                path.unlink()
+    store.place.write(counted.name, content_of(counted, store.plan, store.manifest.study))
+    for name in merged:
+        if name != counted.name:
+            store.place.remove(name)

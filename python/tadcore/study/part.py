@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from tadcore._shared.arrays import as_index
@@ -12,6 +11,8 @@ from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.outcomes import KINDS
 from tadcore.statistics.tally import Tally
+
+from .place import Place
 
 _MOST = 99_999
 
@@ -71,6 +72,6 @@ def chunks_of(part: tuple[int, int] | None, trials: int) -> range:
     return range(chunks * (i - 1) // n, chunks * i // n)
 
 
-def folder_of(part: tuple[int, int] | None, store: Path) -> Path:
+def place_of(part: tuple[int, int] | None, store: Place) -> Place:
     """Where a part is stored: readers of Parquet pass over it until it is merged."""
-    return store if part is None else store / f"_part-{part[0]:05d}-of-{part[1]:05d}"
+    return store if part is None else store.inside(f"_part-{part[0]:05d}-of-{part[1]:05d}")

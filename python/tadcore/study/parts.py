@@ -8,23 +8,22 @@ the counts of its outcomes.
 from __future__ import annotations
 
 import base64
+import contextlib
 import re
 import zlib
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tadcore._shared.files import strange
 from tadcore.errors import ScenarioError, StoreError
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.tally import Tally
 
 from .keeping import Keep
-from .manifest import faults
+from .place import Place
 from .plan import Outcomes, Plan
 from .table import digests, encoded, flaw, schema_of, table_of, tally_of
 
@@ -37,48 +36,47 @@ _LARGEST_TALLY = 1 << 18  # bytes in a footer; what has more cells is counted fr
 
 
 class Part(NamedTuple):
-    """Where some consecutive trials are."""
+    """Some consecutive trials, which a file has."""
 
-    path: Path
     first: int
     """The first trial, a multiple of `CHUNK`."""
     end: int
     """One past the last."""
 
     @property
+    def name(self) -> str:
+        """The name of its file."""
+        return f"part-{self.first:010d}-{self.end:010d}.parquet"
+
+    @property
     def chunks(self) -> range:
         """The chunks that it holds, the last perhaps cut."""
         return range(self.first // CHUNK, -(-self.end // CHUNK))
 
-    @property
-    def again(self) -> str:
-        """What to do with one that is damaged."""
-        return _AGAIN
 
-
-def name_of(first: int, end: int) -> str:
-    """The name of the part with the trials from ``first`` to before ``end``."""
-    return f"part-{first:010d}-{end:010d}.parquet"
-
-
-def part_at(path: Path) -> Part:
-    """The part that a name stands for; raises `StoreError` for any other, and for what is no file."""
-    match = _NAME.fullmatch(path.name)
-    part = Part(path, int(match[1]), int(match[2])) if match is not None else None
-    most = GROUP * CHUNK
-    if part is None or part.first % CHUNK or not part.first < part.end <= part.first // most * most + most:
-        raise StoreError(str(path), "its name is not that of a part", "move it out of this folder")
-    with faults(path):
-        found = strange(path)
-    if found is not None:
-        raise StoreError(str(path), f"it is {found}, not a file", "move it out of this folder")
-    return part
+def parts_in(place: Place) -> set[Part]:
+    """The parts that are there; raises `StoreError` for a name that is none's, and for what is no file."""
+    found = set()
+    for name in place.names():
+        if not (name.startswith("part-") and name.endswith(".parquet")):
+            continue
+        match = _NAME.fullmatch(name)
+        part = Part(int(match[1]), int(match[2])) if match is not None else None
+        most = GROUP * CHUNK
+        if part is None or part.first % CHUNK or not part.first < part.end <= part.first // most * most + most:
+            raise StoreError(place.at(name), "its name is not that of a part", "move it out of this folder")
+        strange = place.strange(name)
+        if strange is not None:
+            raise StoreError(place.at(name), f"it is {strange}, not a file", "move it out of this folder")
+        found.add(part)
+    return found
 
 
 class Format:
     """How the parts of one study are written, read and verified."""
 
-    def __init__(self, plan: Plan, study: str, keep: Keep) -> None:
+    def __init__(self, place: Place, plan: Plan, study: str, keep: Keep) -> None:
+        self.place = place
         self.plan = plan
         self.study = study
         self.schema = schema_of(plan, keep)
@@ -100,7 +98,7 @@ class Format:
 
     def footer(self, part: Part, opened: pq.ParquetFile) -> dict[str, str]:
         """What a part says of itself; raises `StoreError` where that is not what its name says."""
-        path = str(part.path)
+        path = self.place.at(part.name)
         about = opened.metadata.metadata or {}
         keys = ("study", "first", "rows", "sha256", "tally")
         said = {key: about.get(f"tadcore_{key}".encode(), b"").decode() for key in keys}
@@ -123,25 +121,27 @@ class Format:
 
     def tally(self, part: Part) -> Tally:
         """The counts of a part, from its footer if it has them."""
-        with _opened(part) as opened:
+        with self._opened(part) as opened:
             packed = self.footer(part, opened)["tally"]
         if not packed:
             return tally_of(self.read(part), self.plan)
         found = _unpacked(packed, self.plan)
         if found is None or found.trials != part.end - part.first:
-            raise StoreError(str(part.path), "its counts are none of its trials", _AGAIN)
+            raise StoreError(self.place.at(part.name), "its counts are none of its trials", _AGAIN)
         return found
 
     def read(self, part: Part, chunks: range | None = None) -> pa.Table:
         """The rows of a part, or of some of its chunks, verified: pages, digests, and that games can end so."""
         wanted = part.chunks if chunks is None else chunks
         places = [chunk - part.chunks.start for chunk in wanted]
-        with _opened(part) as opened:
+        with self._opened(part) as opened:
             said = self.footer(part, opened)["sha256"].split()
             table = opened.read_row_groups(places).cast(self.schema)
             whole = digests(table) == [said[place] for place in places]
         if not whole:
-            raise StoreError(str(part.path), "it is damaged (its rows are not those that were written)", _AGAIN)
+            raise StoreError(
+                self.place.at(part.name), "it is damaged (its rows are not those that were written)", _AGAIN
+            )
         # A digest tells an accident, not an intention: what cannot be an outcome is none, whatever is said of it.
         found = flaw(table, wanted.start * CHUNK, self.plan)
         if found is None and len(self.plan.columns) and self.plan.columns[0] in table.column_names:
@@ -151,36 +151,32 @@ class Format:
             except ScenarioError as error:
                 found = str(error)
         if found is not None:
-            raise StoreError(str(part.path), f"its rows are no outcomes of this study ({found})", _AGAIN)
+            raise StoreError(self.place.at(part.name), f"its rows are no outcomes of this study ({found})", _AGAIN)
         return table
 
     def verify(self, part: Part) -> int:
         """Read all of a part, its counts too; how many trials it has."""
         table, tally = self.read(part), self.tally(part)
         if tally != tally_of(table, self.plan):
-            raise StoreError(str(part.path), "its counts are not those of its rows", _AGAIN)
+            raise StoreError(self.place.at(part.name), "its counts are not those of its rows", _AGAIN)
         return len(table)
 
-
-class _opened:  # noqa: N801 (a context manager, used as a function)
-    """A part, open; what is no Parquet file, and what is damaged, is named."""
-
-    def __init__(self, part: Part) -> None:
-        self._part = part
-        try:
-            self._file = pq.ParquetFile(part.path, page_checksum_verification=True)
-        except (OSError, ValueError, pa.ArrowException) as error:
-            raise StoreError(str(part.path), f"it is truncated or no Parquet file ({error})", _AGAIN) from None
-
-    def __enter__(self) -> pq.ParquetFile:
-        return self._file
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        self._file.close()
-        if isinstance(error, StoreError):
-            return
-        if isinstance(error, OSError | ValueError | pa.ArrowException):
-            raise StoreError(str(self._part.path), f"it is damaged ({error})", _AGAIN) from None
+    @contextlib.contextmanager
+    def _opened(self, part: Part) -> Iterator[pq.ParquetFile]:
+        """A part, open; what is no Parquet file, and what is damaged, is named."""
+        path = self.place.at(part.name)
+        with contextlib.ExitStack() as until_the_end:
+            try:
+                source = until_the_end.enter_context(self.place.source(part.name))
+                opened = pq.ParquetFile(source, page_checksum_verification=True)
+            except (OSError, ValueError, pa.ArrowException) as error:
+                raise StoreError(path, f"it is truncated or no Parquet file ({error})", _AGAIN) from None
+            try:
+                yield opened
+            except StoreError:
+                raise
+            except (OSError, ValueError, pa.ArrowException) as error:
+                raise StoreError(path, f"it is damaged ({error})", _AGAIN) from None
 
 
 def _packed(tally: Tally) -> str:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
-from tadcore._shared.files import as_path
 from tadcore._shared.progress import bar
 from tadcore._shared.threads import in_order
 from tadcore.errors import StoreError
@@ -17,15 +15,17 @@ from tadcore.statistics.stopping import Stopping, from_kept
 from .definition import Definition
 from .keepers import checks_of, rows_there
 from .manifest import MANIFEST, Manifest
+from .place import Place
 from .rows import Rows
 from .store import Store
+from .where import as_place
 
 
-def opened(folder: str | os.PathLike[str]) -> tuple[Store, dict[str, Any]]:
-    """The store in a folder, and the arguments of the study that it holds."""
-    manifest = Manifest.read(as_path("folder", folder))
+def opened(place: Place) -> tuple[Store, dict[str, Any]]:
+    """The store of a place, and the arguments of the study that it holds."""
+    manifest = Manifest.read(place)
     arguments: dict[str, Any] = {
-        "sc": Scenario.from_toml_string(manifest.scenario, name=os.fspath(folder)),
+        "sc": Scenario.from_toml_string(manifest.scenario, name=str(place)),
         "vary": {path: from_table(f'vary["{path}"]', table, stored=True) for path, table in manifest.vary.items()},
         "trials": manifest.trials,
         "seed": manifest.seed,
@@ -34,7 +34,7 @@ def opened(folder: str | os.PathLike[str]) -> tuple[Store, dict[str, Any]]:
         "passes": manifest.passes,
         "keep": manifest.keep,
     }
-    return Store.reading(folder, manifest, Definition(**arguments).plan), arguments
+    return Store.reading(place, manifest, Definition(**arguments).plan), arguments
 
 
 def rows_and_rule(store: Store) -> tuple[Rows, Stopping | None]:
@@ -43,8 +43,9 @@ def rows_and_rule(store: Store) -> tuple[Rows, Stopping | None]:
     try:
         stopping = from_kept(manifest.rule, held=manifest.stopped is not None, chunk=manifest.chunk)
     except ValueError as error:
-        place = str(Path(store.folder, MANIFEST))
-        raise StoreError(place, f"it is no manifest of a study ({error})", "put back a copy of this file") from None
+        raise StoreError(
+            store.place.at(MANIFEST), f"it is no manifest of a study ({error})", "put back a copy of this file"
+        ) from None
     return rows_there(store, manifest.trials if manifest.stopped is None else manifest.stopped), stopping
 
 
@@ -68,6 +69,6 @@ def verify_store(folder: str | os.PathLike[str], *, progress: bool = False) -> i
     StoreError
         A file is truncated, foreign or damaged, or its counts are not those of its rows.
     """
-    checks = checks_of(opened(folder)[0])
+    checks = checks_of(opened(as_place("folder", folder))[0])
     counted = in_order(lambda check: check(), checks, None)
     return sum(bar(counted, "verifying", total=len(checks), show=progress))

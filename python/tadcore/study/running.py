@@ -17,11 +17,12 @@ from .collect import Collection, StoppingRule
 from .definition import Definition
 from .keepers import keeper_of
 from .keeping import Keep, as_keep
-from .part import StudyPart, as_part, chunks_of, folder_of
+from .part import StudyPart, as_part, chunks_of, place_of
 from .progress import Progress
 from .rows import Rows
 from .store import Store
 from .warm_start import warm
+from .where import as_place
 
 
 class Options(NamedTuple):
@@ -49,11 +50,11 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
     if until is not None and study.design != "random":
         rule = "left out: its interval needs independent draws, which only design='random' gives"
         raise ScenarioError("until", f"a rule for design={study.design!r}", rule)
-    folder = None if options.store is None else as_path("store", options.store)
+    place = None if options.store is None else as_place("store", options.store)
     table = None if options.table is None else as_path("table", options.table)
     keep = study.keep if options.keep is None else as_keep(options.keep)
     part = None if options.part is None else as_part(options.part)
-    if part is not None and folder is None:
+    if part is not None and place is None:
         raise ScenarioError("part", part, "given with store=…, where the other parts are, too")
     if part is not None and until is not None:
         raise ScenarioError("until", until, "left out: a rule sees all trials in their order, a part has only its own")
@@ -67,8 +68,8 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
     with contextlib.ExitStack() as running:
         running.enter_context(warm(study.scenario, table))
         store = None
-        if folder is not None:
-            store = running.enter_context(Store.writing(folder_of(part, folder), study.manifest(keep), plan))
+        if place is not None:
+            store = running.enter_context(Store.writing(place_of(part, place), study.manifest(keep), plan))
         trials = max(0, min(study.trials, chunks.stop * CHUNK) - chunks.start * CHUNK)
         bar = running.enter_context(Progress(trials, wanted=progress))
         keeper = keeper_of(plan, study.trials, keep, store, hold=part is None)

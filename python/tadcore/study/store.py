@@ -13,66 +13,61 @@ killed between the two, the larger part counts.
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any, Self
 
 import pyarrow as pa
 
-from tadcore._shared.files import PARTIAL, write_whole
+from tadcore._shared.files import PARTIAL
 from tadcore._shared.threads import cores
 from tadcore.errors import StoreError
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.tally import Tally
 
 from .keeping import Keep
-from .lock import alone
-from .manifest import MANIFEST, Manifest, environment, faults, refuse_old
-from .parts import Format, Part, part_at
+from .manifest import MANIFEST, Manifest, environment, refuse_old
+from .parts import Format, Part, parts_in
+from .place import Place
 from .plan import Plan
 from .table import tally_of
 
 
 class Store:
-    """The parts of one study in one folder; made by `Store.writing` or `Store.reading`."""
+    """The parts of one study in one place; made by `Store.writing` or `Store.reading`."""
 
-    def __init__(self, folder: str | os.PathLike[str], manifest: Manifest, plan: Plan) -> None:
-        self.folder = Path(folder)
+    def __init__(self, place: Place, manifest: Manifest, plan: Plan) -> None:
+        self.place = place
         self.manifest = manifest
         self.plan = plan
-        self.format = Format(plan, manifest.study, manifest.keep)
+        self.format = Format(place, plan, manifest.study, manifest.keep)
         self.files = self._found()
         self.parts = _by_chunk(self.files)
 
     @classmethod
-    def reading(cls, folder: str | os.PathLike[str], manifest: Manifest, plan: Plan) -> Self:
+    def reading(cls, place: Place, manifest: Manifest, plan: Plan) -> Self:
         """The store as it is."""
-        store = cls(folder, manifest, plan)
+        store = cls(place, manifest, plan)
         if manifest.columns != plan.columns:
             found = f"its columns are {list(manifest.columns)}, and what varies has {list(plan.columns)}"
-            raise StoreError(str(Path(folder) / MANIFEST), found, "put back a copy of this file")
+            raise StoreError(place.at(MANIFEST), found, "put back a copy of this file")
         return store
 
     @classmethod
     @contextlib.contextmanager
-    def writing(cls, folder: str | os.PathLike[str], wanted: Manifest, plan: Plan) -> Iterator[Self]:
+    def writing(cls, place: Place, wanted: Manifest, plan: Plan) -> Iterator[Self]:
         """Make or continue the store of a study, alone; raises `StoreError` where another run or study has it."""
-        place = Path(folder)
-        with contextlib.ExitStack() as until_the_end:
-            with faults(place):
-                place.mkdir(parents=True, exist_ok=True)
-                until_the_end.enter_context(alone(place))
+        place.make()
+        with place.alone():
             manifest = _agreed(place, wanted)
-            for partial in [*place.glob(f"{PARTIAL}*.parquet"), *place.glob(f"{PARTIAL}*.json")]:
-                with faults(partial):
-                    partial.unlink()  # left by a run that was killed
-            if manifest.trials != wanted.trials or not (place / MANIFEST).exists():
+            for name in place.names():
+                if name.startswith(PARTIAL) and name.endswith((".parquet", ".json")):
+                    place.remove(name)  # left by a run that was killed
+            if manifest.trials != wanted.trials or not place.exists(MANIFEST):
                 manifest = replace(manifest, trials=max(manifest.trials, wanted.trials))
-                write(place / MANIFEST, manifest.to_json())
+                place.write(MANIFEST, manifest.to_json())
             yield cls(place, manifest, plan)
 
     @property
@@ -122,11 +117,10 @@ class Store:
         """Note which rule is asked, and after how many trials it held."""
         if (trials, rule) != (self.manifest.stopped, self.manifest.rule):
             self.manifest = replace(self.manifest, stopped=trials, rule=rule)
-            write(self.folder / MANIFEST, self.manifest.to_json())
+            self.place.write(MANIFEST, self.manifest.to_json())
 
     def _found(self) -> set[Part]:
-        with faults(self.folder):
-            return {part_at(path) for path in sorted(self.folder.glob("part-*.parquet"))}
+        return parts_in(self.place)
 
 
 def _by_chunk(files: Iterable[Part]) -> dict[int, Part]:
@@ -141,11 +135,11 @@ def _by_chunk(files: Iterable[Part]) -> dict[int, Part]:
     return parts
 
 
-def _agreed(place: Path, wanted: Manifest) -> Manifest:
+def _agreed(place: Place, wanted: Manifest) -> Manifest:
     """The manifest that is there if it is this study's, or the one to write."""
     refuse_old(place)
-    if not (place / MANIFEST).exists():
-        if any(place.glob("part-*.parquet")) or any(place.glob("counts-*.parquet")):
+    if not place.exists(MANIFEST):
+        if any(name.startswith(("part-", "counts-")) and name.endswith(".parquet") for name in place.names()):
             raise StoreError(str(place), "it holds parts but no manifest", "name another folder for the store")
         return replace(wanted, created=datetime.now(UTC).isoformat(timespec="seconds"), environment=environment())
     there = Manifest.read(place)
@@ -154,11 +148,3 @@ def _agreed(place: Path, wanted: Manifest) -> Manifest:
         found = f"it was written by tadcore {there.version}, and this is {wanted.version}"
         raise StoreError(str(place), found, "continue it with that version, read it with load_study, or start anew")
     return there
-
-
-def write(path: Path, content: str | bytes | memoryview) -> None:
-    """Write a file of a store, whole; raises `StoreError` for what the system refuses, and for a link."""
-    if path.is_symlink():  # a store that came from elsewhere must not decide what else is written
-        raise StoreError(str(path), "it is a link, and a store writes nothing outside its folder", "remove the link")
-    with faults(path):
-        write_whole(path, content)

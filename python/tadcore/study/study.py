@@ -49,6 +49,7 @@ from .reading import opened, rows_and_rule
 from .rows import MOST_BYTES, Rows
 from .running import Options, gathered
 from .trials import Trials
+from .where import as_place
 
 
 class Study(Definition):
@@ -396,5 +397,5 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
     StoreError
         The folder is no store, or one of its files is truncated, foreign or damaged.
     """
-    store, arguments = opened(folder)
+    store, arguments = opened(as_place("folder", folder))
     return StudyResult(Study(**arguments), *rows_and_rule(store))

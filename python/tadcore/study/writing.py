@@ -13,10 +13,9 @@ import pyarrow as pa
 from tadcore.sampling.design import CHUNK
 
 from . import parts
-from .manifest import faults
-from .parts import Part, name_of
+from .parts import Part
 from .plan import Outcomes
-from .store import Store, write
+from .store import Store
 
 _PATIENCE = 5.0  # seconds that a finished chunk waits for its part to be whole
 _HELD = 4  # parts of which the chunks that are stored stay at hand until the rest comes, so that none is read again
@@ -91,10 +90,10 @@ class Writer:
         rows |= {chunk: len(outcomes.kind) for chunk, outcomes in chunks.items()}
         for run in _runs(rows):
             first, end = run.start * CHUNK, run[-1] * CHUNK + rows[run[-1]]
-            part = Part(store.folder / name_of(first, end), first, end)
+            part = Part(first, end)
             if part not in store.files:  # its name says what is in it
                 table = pa.concat_tables(self._tables(run, chunks))
-                write(part.path, store.format.bytes(first, table))
+                store.place.write(part.name, store.format.bytes(first, table))
             store.files.add(part)
             for chunk in run:
                 store.parts[chunk] = part
@@ -126,8 +125,7 @@ class Writer:
         in_use = {self._store.parts[chunk] for chunk in self._stored(group)}
         for part in self._files():
             if self._group(part) == group and part not in in_use:
-                with faults(part.path):
-                    part.path.unlink(missing_ok=True)
+                self._store.place.remove(part.name)
                 self._store.files.discard(part)
 
 

@@ -18,7 +18,7 @@ from tadcore.cli.app import main
 from tadcore.statistics import Tally
 from tadcore.study import merge_store
 from tadcore.study.part import chunks_of
-from tadcore.study.parts import Part, name_of
+from tadcore.study.parts import Part
 from tadcore.study.plan import Outcomes, Played
 from tadcore.study.store import Store
 from tadcore.study.workers import Groups, Wanted, played_by
@@ -65,7 +65,7 @@ def test_merged_parts_are_the_study(keep, tmp_path):
 def test_parts_are_listed_while_another_thread_adds_some(tmp_path, monkeypatch):
     """Two threads write: one looks through thousands of parts for those of its group while the other adds its own."""
     monkeypatch.setattr("tadcore.study.parts.GROUP", 1)
-    there = [Part(tmp_path / name_of(i * CHUNK, (i + 1) * CHUNK), i * CHUNK, (i + 1) * CHUNK) for i in range(99, 9999)]
+    there = [Part(i * CHUNK, (i + 1) * CHUNK) for i in range(99, 9999)]
     found = Store._found
     monkeypatch.setattr(Store, "_found", lambda store: found(store) | set(there))
     interval = sys.getswitchinterval()
