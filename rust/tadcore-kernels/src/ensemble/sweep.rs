@@ -125,7 +125,7 @@ fn look_up<V: Simd, const N: usize, const M: usize>(
     table: &StepTable,
     slots: &mut [u32; BLOCK],
 ) -> bool {
-    let mut all = true;
+    // A branch for each slot: what is asked of all in the end, compilers gather in a register one by one.
     if N * M <= DIRECT_BITS {
         let mut low = V::low(seen);
         for half in 0..2 {
@@ -134,16 +134,20 @@ fn look_up<V: Simd, const N: usize, const M: usize>(
                 let slot = u32::from(direct[low[half] as usize & (direct.len() - 1)]);
                 low[half] >>= 16;
                 slots[half * BLOCK / 2 + l] = slot;
-                all &= slot != 0;
+                if slot == 0 {
+                    return false;
+                }
             }
         }
     } else {
         for (slot, key) in slots.iter_mut().zip(V::keys(seen)) {
             *slot = table.find(&[key]);
-            all &= *slot != 0;
+            if *slot == 0 {
+                return false;
+            }
         }
     }
-    all
+    true
 }
 
 /// What comes between sight and network: nothing, or what is called block by block; what stays in registers; and that with
