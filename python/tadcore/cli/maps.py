@@ -141,7 +141,7 @@ def _rows(x: tuple[float, float], y: tuple[float, float], size: int) -> int:
 
 
 def write_report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="The store of a study.")],
+    folder: Annotated[str, typer.Argument(metavar="DIR", help="The store of a study, a folder or a URL.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("report.html"),
     title: Annotated[str, typer.Option(metavar="TEXT", help="What to call the study.")] = "",
     level: Annotated[

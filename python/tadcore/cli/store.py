@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,7 +13,7 @@ from .terminal import say
 store = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 """The group of commands."""
 
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a study.")]
+Folder = Annotated[str, typer.Argument(metavar="DIR", help="The folder of a study, or its URL.")]
 
 
 @store.callback()

@@ -29,7 +29,9 @@ class Keeping(enum.StrEnum):
 
 def study(
     file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")],
-    store: Annotated[Path, typer.Option(metavar="DIR", help="Where finished chunks are kept; continued if there.")],
+    store: Annotated[
+        str, typer.Option(metavar="DIR", help="Where finished chunks are kept, a folder or a URL; continued if there.")
+    ],
     threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
     table: Annotated[
         Path | None,
@@ -55,6 +57,7 @@ def study(
       tadcore study my-study.toml --store out --threads 4 --no-progress
       tadcore study my-study.toml --store out --table paper-i1.table
       tadcore study my-study.toml --store out --keep counts
+      tadcore study my-study.toml --store s3://bucket/out
       tadcore study my-study.toml --store out --part 3/100
 
     Run again, it resumes from what DIR holds. A study file:
@@ -101,7 +104,7 @@ def study(
         say(f"{result!r}")
         say(f"written to {store}; tadcore store merge {store} makes one store of all parts")
         if as_json:
-            emit({"trials": result.trials, "part": list(which), "store": str(store)})
+            emit({"trials": result.trials, "part": list(which), "store": store})
         return
     found = result.probabilities()
     say(f"{result.trials:,} trials")
@@ -114,7 +117,7 @@ def study(
         rows = zip(found.names, found.count, found.estimate, found.low, found.high, strict=True)
         names = ("count", "estimate", "low", "high")
         outcomes = {row[0]: dict(zip(names, (int(row[1]), *map(float, row[2:])), strict=True)) for row in rows}
-        about = {"level": found.level, "method": found.method, "rule": found.rule, "store": str(store)}
+        about = {"level": found.level, "method": found.method, "rule": found.rule, "store": store}
         emit({"trials": result.trials, "seed": wanted.seed, "outcomes": outcomes, **about})
 
 

@@ -17,7 +17,9 @@ from tadcore.sampling.design import CHUNK
 from tadcore.statistics.stopping import Stopping, kept, stopping_by
 from tadcore.statistics.tally import Tally
 
+from .elsewhere import Reached
 from .keepers import Keeper
+from .parts import Joined
 from .plan import Plan
 from .progress import Progress
 from .workers import LostWorkerError, Wanted, played_by
@@ -81,7 +83,9 @@ class Collection:
         """The trials up to there."""
         return self._trials if self._stopped is None else self._stopped
 
-    def gather(self, executor: Executor | None, threads: int | None, table: Path | None) -> None:
+    def gather(
+        self, executor: Executor | None, threads: int | None, table: Path | None, store: Reached | None = None
+    ) -> None:
         """Take what is stored, and play what is not."""
         stopping = self.stopping
         left = self._keeper.begin(self._chunks, None if stopping is None else kept(stopping))
@@ -91,16 +95,26 @@ class Collection:
         with contextlib.closing(self._keeper):
             try:
                 if self._stopped is None and left:
-                    self._play(left, executor, threads, table)
+                    self._play(left, executor, threads, table, store)
             except LostWorkerError as error:
                 place = self._keeper.place
                 raise WorkerError(str(error), self._done, len(self._chunks), place) from error.__cause__
         self._tell()
 
-    def _play(self, left: list[int], executor: Executor | None, threads: int | None, table: Path | None) -> None:
-        wanted = Wanted(left, self._trials, self._keeper.keep, self._until is not None)
-        with contextlib.closing(played_by(self._plan, wanted, executor, threads, table)) as results:
+    def _play(
+        self,
+        left: list[int],
+        executor: Executor | None,
+        threads: int | None,
+        table: Path | None,
+        store: Reached | None,
+    ) -> None:
+        wanted = Wanted(left, self._trials, self._keeper.keep, self._until is not None, self._keeper.joins)
+        with contextlib.closing(played_by(self._plan, wanted, executor, threads, table, store)) as results:
             for played in results:
+                if isinstance(played, Joined):
+                    self._keeper.add(played)
+                    continue
                 self._add(played.task.first, played.task.many, played.tallies)
                 if self._stopped is None or self._keeper.keep != "counts":
                     self._keeper.add(played)

@@ -24,7 +24,8 @@ from tadcore.simulation.termination import Termination, as_termination
 
 from .keeping import Keep, as_keep
 from .manifest import Manifest
-from .plan import Plan, rows_of_chunks
+from .plan import Plan
+from .task import rows_of_chunks
 
 _MOST_TRIALS = 2**32  # points of the Sobol' sequence
 

@@ -31,6 +31,10 @@ class Folder:
         """The path of a file."""
         return str(self.path / name)
 
+    def absolute(self) -> Folder:
+        """From the root."""
+        return Folder(self.path.absolute())
+
     def inside(self, name: str) -> Folder:
         """A folder in it."""
         return Folder(self.path / name)

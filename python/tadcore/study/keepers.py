@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Protocol
@@ -15,10 +16,12 @@ from tadcore.statistics.tally import Tally
 
 from .counted import Counted, content_of, ranges_in, read_counts
 from .keeping import Keep
-from .plan import Plan, Played, Task
+from .parts import Join, Joined
+from .plan import Plan
 from .rows import EAGER, Counts, InMemory, InStore, Rows
 from .store import Store
 from .table import schema_of, table_of, tally_of
+from .task import Played, Task
 from .writing import Writer
 
 _PATIENCE = 1.0  # seconds between two files of counts
@@ -40,8 +43,12 @@ class Keeper(Protocol):
     def stored(self, *, apart: bool) -> Iterator[tuple[int, int, Tally]]:
         """What is there already: first chunk, number of chunks and counts; with ``apart`` chunk by chunk."""
 
-    def add(self, played: Played) -> None:
-        """Take a group."""
+    def add(self, played: Played | Joined) -> None:
+        """Take a group, or note that parts were joined."""
+
+    @property
+    def joins(self) -> deque[Join] | None:
+        """What workers shall join."""
 
     def close(self) -> None:
         """Bring to the disk what has been taken."""
@@ -56,13 +63,14 @@ class Keeper(Protocol):
 class RowKeeper:
     """Keeps a row for every trial: in memory, in a store, or both."""
 
-    def __init__(self, plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool) -> None:
-        self.keep = keep
+    def __init__(self, plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool, workers: bool) -> None:
+        self.keep, self._workers = keep, workers
         self._plan, self._trials, self._store = plan, trials, store
         self._schema = schema_of(plan, keep)
         self._held: dict[int, pa.Table] | None = {} if store is None or (hold and trials <= EAGER) else None
         self._there: list[int] = []
         self._writer: Writer | None = None
+        self._read = False  # whether the rows are to be in memory at the end, and workers have them
 
     @property
     def place(self) -> str | None:
@@ -77,7 +85,7 @@ class RowKeeper:
         self._there = [chunk for chunk in chunks if store.rows(chunk) >= self._rows(chunk)]
         there = set(self._there)
         left = [chunk for chunk in chunks if chunk not in there]
-        self._writer = Writer(store, left)
+        self._writer = Writer(store, left, workers=self._workers)
         return left
 
     def stored(self, *, apart: bool) -> Iterator[tuple[int, int, Tally]]:
@@ -94,8 +102,23 @@ class RowKeeper:
                     self._held[chunk] = piece
                 yield chunk, 1, tally_of(piece, self._plan)
 
-    def add(self, played: Played) -> None:
-        """Hand the chunks to the writer, and hold them where all fit into memory."""
+    @property
+    def joins(self) -> deque[Join] | None:
+        """What the writer has for workers."""
+        return None if self._writer is None else self._writer.joins
+
+    def add(self, played: Played | Joined) -> None:
+        """Hand the chunks to the writer, and hold them where all fit into memory, unless a worker has written them."""
+        if isinstance(played, Joined):
+            assert self._writer is not None  # which asked for it
+            self._writer.joined(played)
+            return
+        if played.written:
+            assert self._writer is not None  # into whose store they were written
+            self._read = self._read or self._held is not None
+            self._held = None
+            self._writer.found(played.written)
+            return
         for (chunk, _), outcomes in zip(played.task.chunks(), played.outcomes, strict=True):
             if self._held is not None:
                 self._held[chunk] = table_of(chunk * CHUNK, [outcomes], self._plan, self._schema)
@@ -116,7 +139,8 @@ class RowKeeper:
         """In memory if they are held, else in the store."""
         if self._held is None:
             assert self._store is not None  # what is not held is stored
-            return InStore(self._store, trials, tally)
+            rows = InStore(self._store, trials, tally)
+            return InMemory(rows.table(), self._plan) if self._read else rows
         tables = [self._held[chunk] for chunk in sorted(self._held) if chunk * CHUNK < trials]
         return InMemory(pa.concat_tables([self._schema.empty_table(), *tables]).combine_chunks(), self._plan)
 
@@ -177,8 +201,13 @@ class CountKeeper:
         if chunks:
             yield self._first // CHUNK, chunks, self._tally
 
-    def add(self, played: Played) -> None:
+    @property
+    def joins(self) -> None:
+        """Nothing: there is one file alone."""
+
+    def add(self, played: Played | Joined) -> None:
         """Count a group when all before it have come."""
+        assert isinstance(played, Played)  # as there are no parts
         self._waiting[played.task.first] = played
         while self._next in self._waiting:
             ready = self._waiting.pop(self._next)
@@ -215,9 +244,14 @@ class CountKeeper:
         return Counts(tally)
 
 
-def keeper_of(plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool) -> Keeper:
-    """What keeps that much of every trial; with ``hold`` the rows in memory, too, where they are not too many."""
-    return CountKeeper(plan, trials, store) if keep == "counts" else RowKeeper(plan, trials, keep, store, hold=hold)
+def keeper_of(plan: Plan, trials: int, keep: Keep, store: Store | None, *, hold: bool, workers: bool = False) -> Keeper:
+    """What keeps that much of every trial.
+
+    With ``hold`` the rows are in memory, too, where they are not too many; with ``workers`` others write to the store.
+    """
+    if keep == "counts":
+        return CountKeeper(plan, trials, store)
+    return RowKeeper(plan, trials, keep, store, hold=hold, workers=workers)
 
 
 def rows_there(store: Store, wanted: int) -> Rows:

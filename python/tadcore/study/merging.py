@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from tadcore.errors import StoreError
 
@@ -39,7 +41,7 @@ class Merged:
     wanted: int
 
 
-def merge_store(folder: str | os.PathLike[str]) -> Merged:
+def merge_store(folder: str | os.PathLike[str], *, storage_options: Mapping[str, Any] | None = None) -> Merged:
     """Make one store of the parts that jobs with ``part=(i, n)`` have left in a folder.
 
     Parts that are not there, or not finished, leave trials out; `tadcore.Study.run` with the same store plays these,
@@ -47,8 +49,10 @@ def merge_store(folder: str | os.PathLike[str]) -> Merged:
 
     Parameters
     ----------
-    folder : path
+    folder : path or URL
         The store that all parts were given.
+    storage_options : mapping, optional
+        Options of fsspec for a store at a URL, as in `tadcore.Study.run`.
 
     Returns
     -------
@@ -60,7 +64,7 @@ def merge_store(folder: str | os.PathLike[str]) -> Merged:
     StoreError
         There are no parts, one is of another study or still being written, or a file is damaged.
     """
-    place = as_place("folder", folder)
+    place = as_place("folder", folder, storage_options)
     names = [name for name in place.names() if _PART.fullmatch(name)]
     found = [place.inside(name) for name in names]
     if not found:

@@ -24,8 +24,9 @@ from tadcore.statistics.tally import Tally
 
 from .keeping import Keep
 from .place import Place
-from .plan import Outcomes, Plan
+from .plan import Plan
 from .table import digests, encoded, flaw, schema_of, table_of, tally_of
+from .task import Outcomes, Written
 
 GROUP = 64
 """Chunks in a part at most: a billion trials are 1,908 files. Parts begin at multiples of it."""
@@ -52,6 +53,27 @@ class Part(NamedTuple):
     def chunks(self) -> range:
         """The chunks that it holds, the last perhaps cut."""
         return range(self.first // CHUNK, -(-self.end // CHUNK))
+
+
+class Join(NamedTuple):
+    """What is asked of a worker where smaller parts are to become one."""
+
+    first: int
+    """The first chunk."""
+    pieces: tuple[tuple[Part, range], ...]
+    """Consecutive parts, with the chunks that are taken of each."""
+
+    @property
+    def last(self) -> int:
+        """The last chunk."""
+        return self.pieces[-1][1][-1]
+
+
+class Joined(NamedTuple):
+    """What comes back."""
+
+    task: Join
+    written: tuple[Written, ...]
 
 
 def parts_in(place: Place) -> set[Part]:
@@ -85,16 +107,35 @@ class Format:
         """Outcomes of consecutive chunks as rows."""
         return table_of(first, chunks, self.plan, self.schema)
 
-    def bytes(self, first: int, table: pa.Table) -> memoryview:
-        """The rows from a trial on as the content of a part: a function of them and of the study alone."""
+    def put(self, first: int, table: pa.Table) -> Written:
+        """Write the rows from a trial on as a part, whose bytes are a function of them and of the study alone."""
+        part, found = Part(first, first + len(table)), digests(table)
         said = {
             "study": self.study,
             "first": str(first),
             "rows": str(len(table)),
-            "sha256": " ".join(digests(table)),
+            "sha256": " ".join(found),
             "tally": _packed(tally_of(table, self.plan)),
         }
-        return encoded(table, {f"tadcore_{key}": value for key, value in said.items()})
+        self.place.write(part.name, encoded(table, {f"tadcore_{key}": value for key, value in said.items()}))
+        return Written(part.first, part.end, tuple(found))
+
+    def confirm(self, written: Written) -> Part:
+        """The part that somebody says to have written; raises `StoreError` where it is not to be found here."""
+        part = Part(written.first, written.end)
+        if not self.place.exists(part.name):
+            found = "a worker says that it has written it, and it is not there"
+            raise StoreError(self.place.at(part.name), found, "let the workers and this process share one folder")
+        with self._opened(part) as opened:
+            said = self.footer(part, opened)["sha256"].split()
+        if said != list(written.digests):
+            raise StoreError(self.place.at(part.name), "it does not hold what a worker has written", _AGAIN)
+        return part
+
+    def join(self, task: Join) -> Joined:
+        """Write the rows of several parts as one."""
+        rows = pa.concat_tables([self.read(part, held) for part, held in task.pieces])
+        return Joined(task, (self.put(task.first * CHUNK, rows),))
 
     def footer(self, part: Part, opened: pq.ParquetFile) -> dict[str, str]:
         """What a part says of itself; raises `StoreError` where that is not what its name says."""
@@ -168,7 +209,7 @@ class Format:
         with contextlib.ExitStack() as until_the_end:
             try:
                 source = until_the_end.enter_context(self.place.source(part.name))
-                opened = pq.ParquetFile(source, page_checksum_verification=True)
+                opened = pq.ParquetFile(source, page_checksum_verification=True, pre_buffer=True)
             except (OSError, ValueError, pa.ArrowException) as error:
                 raise StoreError(path, f"it is truncated or no Parquet file ({error})", _AGAIN) from None
             try:

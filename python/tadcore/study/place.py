@@ -22,6 +22,9 @@ class Place(Protocol):
     def at(self, name: str) -> str:
         """What messages call a file."""
 
+    def absolute(self) -> Place:
+        """The same, for a process that works in another folder."""
+
     def inside(self, name: str) -> Place:
         """The place of that name within this one, whether it is there or not."""
 

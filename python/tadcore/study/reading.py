@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 from tadcore._shared.progress import bar
-from tadcore._shared.threads import in_order
+from tadcore._shared.threads import cores, in_order
 from tadcore.errors import StoreError
 from tadcore.sampling.adapters import from_table
 from tadcore.scenario.model import Scenario
@@ -49,15 +50,19 @@ def rows_and_rule(store: Store) -> tuple[Rows, Stopping | None]:
     return rows_there(store, manifest.trials if manifest.stopped is None else manifest.stopped), stopping
 
 
-def verify_store(folder: str | os.PathLike[str], *, progress: bool = False) -> int:
+def verify_store(
+    folder: str | os.PathLike[str], *, progress: bool = False, storage_options: Mapping[str, Any] | None = None
+) -> int:
     """Read everything that a store holds, however large it is.
 
     Parameters
     ----------
-    folder : path
+    folder : path or URL
         The store.
     progress : bool
         Show a bar in a terminal or a notebook.
+    storage_options : mapping, optional
+        Options of fsspec for a store at a URL, as in `tadcore.Study.run`.
 
     Returns
     -------
@@ -69,6 +74,7 @@ def verify_store(folder: str | os.PathLike[str], *, progress: bool = False) -> i
     StoreError
         A file is truncated, foreign or damaged, or its counts are not those of its rows.
     """
-    checks = checks_of(opened(as_place("folder", folder))[0])
-    counted = in_order(lambda check: check(), checks, None)
+    store = opened(as_place("folder", folder, storage_options))[0]
+    checks = checks_of(store)
+    counted = in_order(lambda check: check(), checks, max(cores(), store.place.threads))
     return sum(bar(counted, "verifying", total=len(checks), show=progress))

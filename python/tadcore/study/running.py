@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Mapping
 from concurrent.futures import Executor
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tadcore._shared.arrays import as_index
 from tadcore._shared.files import as_path
@@ -15,6 +16,7 @@ from tadcore.statistics.stopping import Stopping
 
 from .collect import Collection, StoppingRule
 from .definition import Definition
+from .elsewhere import signed
 from .keepers import keeper_of
 from .keeping import Keep, as_keep
 from .part import StudyPart, as_part, chunks_of, place_of
@@ -36,6 +38,7 @@ class Options(NamedTuple):
     table: str | os.PathLike[str] | None
     keep: Keep | None
     part: tuple[int, int] | None
+    storage_options: Mapping[str, Any] | None
 
 
 def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None] | StudyPart:
@@ -50,7 +53,7 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
     if until is not None and study.design != "random":
         rule = "left out: its interval needs independent draws, which only design='random' gives"
         raise ScenarioError("until", f"a rule for design={study.design!r}", rule)
-    place = None if options.store is None else as_place("store", options.store)
+    place = None if options.store is None else as_place("store", options.store, options.storage_options)
     table = None if options.table is None else as_path("table", options.table)
     keep = study.keep if options.keep is None else as_keep(options.keep)
     part = None if options.part is None else as_part(options.part)
@@ -72,9 +75,12 @@ def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None
             store = running.enter_context(Store.writing(place_of(part, place), study.manifest(keep), plan))
         trials = max(0, min(study.trials, chunks.stop * CHUNK) - chunks.start * CHUNK)
         bar = running.enter_context(Progress(trials, wanted=progress))
-        keeper = keeper_of(plan, study.trials, keep, store, hold=part is None)
+        reached = None
+        if executor is not None and store is not None:
+            reached = running.enter_context(signed(store))
+        keeper = keeper_of(plan, study.trials, keep, store, hold=part is None, workers=reached is not None)
         collection = Collection(plan, study.trials, chunks, keeper, bar, until)
-        collection.gather(executor, threads, table)
+        collection.gather(executor, threads, table, reached)
         if part is not None:
             return StudyPart(part, chunks.start * CHUNK, trials, collection.tally)
         return keeper.rows(collection.trials, collection.tally), collection.stopping

@@ -110,7 +110,7 @@ class Store:
             table = self.format.read(part, held)
             return tally_of(table.slice(0, trials - held.start * CHUNK), self.plan)
 
-        with ThreadPoolExecutor(cores()) as pool:
+        with ThreadPoolExecutor(max(cores(), self.place.threads)) as pool:
             return Tally.sum(pool.map(counted, runs), sc.n, sc.steps)
 
     def stop(self, trials: int | None, rule: dict[str, Any] | None) -> None:

@@ -16,13 +16,15 @@ Any executor of `concurrent.futures` computes the chunks, here and elsewhere:
     with mpi4py.futures.MPIPoolExecutor() as pool:                           # mpiexec -n 64 python -m mpi4py.futures
         study.run(executor=pool, store="out")
 
-Every worker process has its own table of gains, which it reads from the file that ``table`` names. The store is written
-by the process that calls `Study.run`.
+Every worker process has its own table of gains, which it reads from the file that ``table`` names. Workers that reach
+the store, a folder that they share or a URL, write their rows there; the process that calls `Study.run` counts, and
+writes the rest.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from functools import cached_property
 from typing import Any, overload
@@ -153,6 +155,7 @@ class Study(Definition):
         table: str | os.PathLike[str] | None = None,
         keep: Keep | None = None,
         part: None = None,
+        storage_options: Mapping[str, Any] | None = None,
     ) -> StudyResult: ...
     @overload
     def run(
@@ -165,6 +168,7 @@ class Study(Definition):
         table: str | os.PathLike[str] | None = None,
         keep: Keep | None = None,
         part: tuple[int, int],
+        storage_options: Mapping[str, Any] | None = None,
     ) -> StudyPart: ...
     @public
     def run(
@@ -178,6 +182,7 @@ class Study(Definition):
         table: str | os.PathLike[str] | None = None,
         keep: Keep | None = None,
         part: tuple[int, int] | None = None,
+        storage_options: Mapping[str, Any] | None = None,
     ) -> StudyResult | StudyPart:
         """Play the trials.
 
@@ -185,14 +190,15 @@ class Study(Definition):
         ----------
         progress : bool or str
             Show a bar with the rate and running estimates, in a terminal or a notebook; a string stands before it.
-        store : path, optional
-            A folder that keeps what is finished. If it holds this study already, the run resumes from there; a
-            larger ``trials`` extends it.
+        store : path or URL, optional
+            A folder that keeps what is finished, or a place such as ``"s3://bucket/prefix"`` (see
+            :doc:`/howto/cluster`). If it holds this study already, the run resumes from there; a larger ``trials``
+            extends it.
         threads : int, optional
             Threads that play; all cores by default, or 1 in each worker of an executor.
         executor : concurrent.futures.Executor, optional
             Who computes the chunks: a process pool, Dask's ``client.get_executor()``, ``MPIPoolExecutor``. By default
-            threads of this process do.
+            threads of this process do. Workers that reach the store write their rows themselves; others send them.
         until : StoppingRule, optional
             Stop after the first chunk, in their order, at which its ``satisfied(counts, trials)`` holds. Statistics of
             the result then use confidence sequences, which hold whatever the rule looked at.
@@ -207,6 +213,9 @@ class Study(Definition):
         part : tuple of int, optional
             (i, n): play part i, from 1, of n, each as many trials, into a folder of its own in ``store``. So n jobs, on
             any machines that share the folder, play a study; `tadcore.study.merge_store` makes one store of them.
+        storage_options : mapping, optional
+            Options of fsspec for a store at a URL, as pandas takes them. Without them Arrow's own file systems serve
+            S3, Google Cloud Storage and Azure, with the credentials of the environment.
 
         Returns
         -------
@@ -227,7 +236,7 @@ class Study(Definition):
         KeyboardInterrupt
             Ctrl-C; what was finished is in the store.
         """
-        found = gathered(self, Options(progress, store, threads, executor, until, table, keep, part))
+        found = gathered(self, Options(progress, store, threads, executor, until, table, keep, part, storage_options))
         return found if isinstance(found, StudyPart) else StudyResult(self, *found)
 
 
@@ -352,9 +361,9 @@ class StudyResult(Trials):
         return simulate(self.setup(row), termination=self.termination, seed=self.seed, trial=row)
 
     @classmethod
-    def load(cls, folder: str | os.PathLike[str]) -> StudyResult:
+    def load(cls, folder: str | os.PathLike[str], *, storage_options: Mapping[str, Any] | None = None) -> StudyResult:
         """`load_study`."""
-        return load_study(folder)
+        return load_study(folder, storage_options=storage_options)
 
     def __repr__(self) -> str:
         asked = f" of {self.study.trials:,}" if self.trials < self.study.trials else ""
@@ -371,7 +380,7 @@ class StudyResult(Trials):
         )
 
 
-def load_study(folder: str | os.PathLike[str]) -> StudyResult:
+def load_study(folder: str | os.PathLike[str], *, storage_options: Mapping[str, Any] | None = None) -> StudyResult:
     """Read a study back from its store alone.
 
     Up to four million trials are read, and verified; of a longer study a part is read, and verified, when its rows are
@@ -382,8 +391,10 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
 
     Parameters
     ----------
-    folder : path
+    folder : path or URL
         The store.
+    storage_options : mapping, optional
+        Options of fsspec for a store at a URL, as in `Study.run`.
 
     Returns
     -------
@@ -397,5 +408,5 @@ def load_study(folder: str | os.PathLike[str]) -> StudyResult:
     StoreError
         The folder is no store, or one of its files is truncated, foreign or damaged.
     """
-    store, arguments = opened(as_place("folder", folder))
+    store, arguments = opened(as_place("folder", folder, storage_options))
     return StudyResult(Study(**arguments), *rows_and_rule(store))

@@ -27,7 +27,8 @@ from tadcore.sampling.design import CHUNK
 from tadcore.statistics.tally import Tally, steps_of
 
 from .keeping import Keep
-from .plan import Outcomes, Plan
+from .plan import Plan
+from .task import Outcomes
 
 _UNIT = "1"  # everything is dimensionless, as in the paper
 

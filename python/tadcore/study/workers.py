@@ -9,22 +9,22 @@ from __future__ import annotations
 import contextlib
 import pickle
 import queue
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from tadcore._core import Stop
 from tadcore._shared.threads import cores
 from tadcore.errors import ScenarioError, TadcoreError
-from tadcore.sampling.base import Sampler
-from tadcore.sampling.design import CHUNK, Design
-from tadcore.scenario.model import Scenario
-from tadcore.simulation.termination import Termination
+from tadcore.sampling.design import CHUNK
 
+from .elsewhere import Reached, Sent, run_task, sent
 from .keeping import Keep
-from .plan import Plan, Played, Task
-from .warm_start import read_once
+from .parts import Join, Joined
+from .plan import Plan
+from .task import Played, Task
 
 _HERE, _ELSEWHERE = 0.25, 1.5  # seconds of work in a group
 _MOST, _MOST_COUNTED = (
@@ -32,6 +32,10 @@ _MOST, _MOST_COUNTED = (
     4096,
 )  # chunks in a group: of what comes back row by row, and of what is counted where it is played
 _UNKNOWN_WORKERS = 64
+_NEARLY = 4
+
+
+_Submitted: TypeAlias = tuple[Future[Any], Task | Join]
 
 
 class LostWorkerError(Exception):
@@ -48,13 +52,19 @@ class Wanted(NamedTuple):
     keep: Keep
     apart: bool
     """Whether every chunk is counted by itself."""
+    joins: deque[Join] | None = None
+    """What workers shall join meanwhile: others add to it."""
 
 
 class Groups:
-    """Groups of consecutive chunks, sized by the speed of those that came back."""
+    """Groups of consecutive chunks, sized by the speed of those that came back.
 
-    def __init__(self, wanted: Wanted, workers: int, seconds: float) -> None:
-        self._wanted, self._workers, self._seconds = wanted, workers, seconds
+    Where workers write parts of ``whole`` chunks no group has chunks of two, and each has all of one where that does
+    not take a few times as long as it should.
+    """
+
+    def __init__(self, wanted: Wanted, workers: int, seconds: float, whole: int = 0) -> None:
+        self._wanted, self._workers, self._seconds, self._whole = wanted, workers, seconds, whole
         self._most = _MOST_COUNTED if wanted.keep == "counts" and not wanted.apart else _MOST
         self._next = 0
         self._speed = 0.0
@@ -74,9 +84,14 @@ class Groups:
         if not self.left:
             return None
         chunks, wanted = self._wanted.chunks, self._wanted
-        size = min(int(self._seconds * self._speed / CHUNK), self._most, self.left // (2 * self._workers))
+        size = int(self._seconds * self._speed / CHUNK)
+        if _NEARLY * size >= self._whole > 0:
+            size = self._whole  # a part that is written at once need not be joined
+        size = min(size, self._most, self.left // (2 * self._workers))
         first, last = self._next, self._next + 1
         while last < len(chunks) and last - first < size and chunks[last] == chunks[last - 1] + 1:
+            if self._whole and chunks[last] % self._whole == 0:
+                break
             last += 1
         self._next = last
         begin, end = chunks[first] * CHUNK, min((chunks[last - 1] + 1) * CHUNK, wanted.trials)
@@ -84,21 +99,26 @@ class Groups:
 
 
 def played_by(
-    plan: Plan, wanted: Wanted, executor: Executor | None, threads: int | None, table: Path | None = None
-) -> Generator[Played]:
+    plan: Plan,
+    wanted: Wanted,
+    executor: Executor | None,
+    threads: int | None,
+    table: Path | None = None,
+    store: Reached | None = None,
+) -> Generator[Played | Joined]:
     """Every group as it is finished, in any order."""
     if executor is not None:
-        return _elsewhere(plan, wanted, executor, 1 if threads is None else threads, table)
+        return _elsewhere(plan, wanted, executor, 1 if threads is None else threads, sent(plan, table, store))
     return _here(plan, wanted, cores() if threads is None else threads)
 
 
-def _here(plan: Plan, wanted: Wanted, threads: int) -> Generator[Played]:
+def _here(plan: Plan, wanted: Wanted, threads: int) -> Generator[Played | Joined]:
     """In threads that each draw, play and count: nothing of that needs the interpreter for long."""
     workers = max(1, min(threads, 4 * cores(), len(wanted.chunks)))
     stop, groups = Stop(), Groups(wanted, workers, _HERE)
     pool = ThreadPoolExecutor(workers, thread_name_prefix="tadcore-play")
 
-    def submit() -> tuple[Future[Played], Task] | None:
+    def submit() -> _Submitted | None:
         share = max(1, threads // max(1, min(workers, groups.left)))  # the last chunks have all threads
         task = groups.take()
         return None if task is None else (pool.submit(plan.run, task, share, stop), task)
@@ -110,26 +130,25 @@ def _here(plan: Plan, wanted: Wanted, threads: int) -> Generator[Played]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _elsewhere(plan: Plan, wanted: Wanted, executor: Executor, threads: int, table: Path | None) -> Generator[Played]:
+def _elsewhere(plan: Plan, wanted: Wanted, executor: Executor, threads: int, given: Sent) -> Generator[Played | Joined]:
     """Enough groups in flight for every worker to have the next one at hand."""
     known = getattr(executor, "_max_workers", None)
     workers = known if isinstance(known, int) else _UNKNOWN_WORKERS
-    groups = Groups(wanted, workers, _ELSEWHERE)
-    fixed = Sent(plan.scenario.to_toml(), plan.vary, plan.seed, plan.design, plan.termination, plan.passes, table)
+    groups = Groups(wanted, workers, _ELSEWHERE, 0 if given.store is None else given.store.group)
 
-    def submit() -> tuple[Future[Played], Task] | None:
-        task = groups.take()
-        return None if task is None else (executor.submit(run_task, fixed, task, threads), task)
+    def submit() -> _Submitted | None:
+        task = wanted.joins.popleft() if wanted.joins else groups.take()
+        return None if task is None else (executor.submit(run_task, given, task, threads), task)
 
     return _in_flight(plan, groups, submit, 2 * workers)
 
 
 def _in_flight(
-    plan: Plan, groups: Groups, submit: Callable[[], tuple[Future[Played], Task] | None], most: int
-) -> Generator[Played]:
+    plan: Plan, groups: Groups, submit: Callable[[], _Submitted | None], most: int
+) -> Generator[Played | Joined]:
     """What comes back while at most so many groups are under way."""
-    running: dict[Future[Played], Task] = {}
-    finished: queue.SimpleQueue[Future[Played]] = queue.SimpleQueue()
+    running: dict[Future[Any], Task | Join] = {}
+    finished: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
 
     def fill() -> None:
         while len(running) < most:
@@ -152,16 +171,17 @@ def _in_flight(
             for future in sorted(_drained(finished), key=lambda f: (_failed(f), running[f].first)):
                 task = running.pop(future)
                 with _told(plan, task):
-                    played = future.result()
-                groups.note(played)
-                yield played
+                    found = future.result()
+                if isinstance(found, Played):
+                    groups.note(found)
+                yield found
             fill()
     finally:
         for future in running:
             future.cancel()
 
 
-def _drained(finished: queue.SimpleQueue[Future[Played]]) -> Iterator[Future[Played]]:
+def _drained(finished: queue.SimpleQueue[Future[Any]]) -> Iterator[Future[Any]]:
     """All that is there, at least one."""
     yield finished.get()
     with contextlib.suppress(queue.Empty):
@@ -169,33 +189,12 @@ def _drained(finished: queue.SimpleQueue[Future[Played]]) -> Iterator[Future[Pla
             yield finished.get_nowait()
 
 
-def _failed(future: Future[Played]) -> bool:
+def _failed(future: Future[Any]) -> bool:
     return future.cancelled() or future.exception() is not None
 
 
-class Sent(NamedTuple):
-    """What a worker in another process makes the plan from."""
-
-    scenario: str
-    vary: dict[str, Sampler]
-    seed: int
-    design: Design
-    termination: Termination
-    passes: bool
-    table: Path | None
-
-
-def run_task(sent: Sent, task: Task, threads: int) -> Played:
-    """`Plan.run` in another process, which keeps its table of gains from group to group."""
-    sc = Scenario.from_toml_string(sent.scenario)
-    plan = Plan(sc, sent.vary, sent.seed, sent.design, sent.termination, sent.passes)
-    if sent.table is not None:
-        read_once(sc, sent.table)
-    return plan.run(task, threads)
-
-
 @contextlib.contextmanager
-def _told(plan: Plan, task: Task | None = None) -> Iterator[None]:
+def _told(plan: Plan, task: Task | Join | None = None) -> Iterator[None]:
     """Tell a dead worker and a sampler that cannot be pickled from an error of the user's own code."""
     try:
         yield
@@ -212,8 +211,7 @@ def _told(plan: Plan, task: Task | None = None) -> Iterator[None]:
                 rule = "a sampler that can be sent to another process: a callable defined at the top of a module"
                 raise ScenarioError(f'vary["{path}"]', sampler, rule) from error
         if task is not None:
-            last = task.chunks()[-1][0]
-            which = f"chunk {task.first}" if last == task.first else f"chunks {task.first} to {last}"
+            which = f"chunk {task.first}" if task.last == task.first else f"chunks {task.first} to {task.last}"
             error.add_note(f"(while computing {which} of the study)")
         raise
 

@@ -78,6 +78,7 @@ def test_extras_bring_what_their_part_imports():
         assert module.replace("_", "-") in names["docs"], module
     assert "bokeh" in names["explore"]
     assert "clarabel" in names["bounds"]
+    assert "fsspec" in names["cloud"]
 
 
 @pytest.mark.parametrize("package", ["rust/tadcore", "rust/tadcore-kernels", "fuzz"])
