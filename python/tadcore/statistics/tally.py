@@ -72,6 +72,13 @@ class Tally:
     def sum(cls, tallies: Iterable[Tally], n: int, steps: int) -> Tally:
         """All trials of several tallies of one game."""
         parts = [cls.empty(n, steps), *tallies]
+        size = 2 * (len(OutcomeKind) + n) * (steps + 1)
+        if size <= max(_DENSE, sum(len(part.cells) for part in parts)):
+            dense = np.zeros(size, dtype=np.int64)
+            for part in parts:
+                dense[part.cells] += part.count  # which has no cell twice
+            found = np.flatnonzero(dense)
+            return cls(n, steps, found.astype(np.int64), dense[found])
         cells, place = np.unique(np.concatenate([part.cells for part in parts]), return_inverse=True)
         count = np.zeros(len(cells), dtype=np.int64)
         np.add.at(count, place.reshape(-1), np.concatenate([part.count for part in parts]))

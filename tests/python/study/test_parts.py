@@ -19,8 +19,8 @@ from tadcore.statistics import Tally
 from tadcore.study import merge_store
 from tadcore.study.part import chunks_of
 from tadcore.study.parts import Part
-from tadcore.study.plan import Outcomes, Played
 from tadcore.study.store import Store
+from tadcore.study.task import Outcomes, Played
 from tadcore.study.workers import Groups, Wanted, played_by
 
 TRIALS = 7 * CHUNK + 11
@@ -186,26 +186,28 @@ class Crowd(futures.Executor):
 
     _max_workers = 1000
 
-    def __init__(self):
-        self.groups = []
+    def __init__(self, steps):
+        self.groups, self.steps = [], steps
         self.tally = None
 
     def submit(self, fn, /, sent, task, threads):
         future = futures.Future()
         if self.tally is None:
             rng = np.random.default_rng(0)
-            kind, step = rng.integers(0, 3, 10**5), rng.integers(0, 21, 10**5)
-            self.tally = Tally.of(kind, np.where(kind == 2, 0, -1), np.zeros(10**5, bool), step, 3, 20)
-        scaled = Tally(3, 20, self.tally.cells, self.tally.count * 0)
+            kind, step = rng.integers(0, 3, 10**5), rng.integers(0, self.steps + 1, 10**5)
+            self.tally = Tally.of(kind, np.where(kind == 2, 0, -1), np.zeros(10**5, bool), step, 3, self.steps)
+        scaled = Tally(3, self.steps, self.tally.cells, self.tally.count * 0)
         scaled.count[0] = task.trials
         self.groups.append(task.trials)
         future.set_result(Played(task, (scaled,), (), task.trials / 2e5))  # as fast as two cores
         return future
 
 
-def test_a_head_takes_what_a_thousand_workers_give():
-    wanted = study(2 * 10**9, keep="counts")
-    crowd = Crowd()
+@pytest.mark.parametrize("steps", [20, 1200])
+def test_a_head_takes_what_a_thousand_workers_give(steps):
+    """Also on the grid of the paper, where a tally has thousands of cells."""
+    wanted = study(2 * 10**9, keep="counts", sc=study().scenario.replace(step=1.0 / steps))
+    crowd = Crowd(steps)
     began = time.process_time()
     result = wanted.run(executor=crowd)
     took = time.process_time() - began
