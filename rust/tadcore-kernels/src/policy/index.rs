@@ -57,9 +57,10 @@ impl Index {
         }
     }
 
-    pub fn clear(&mut self) {
+    /// Forgets every key; `keys` are those held, which a direct index alone has to be told.
+    pub fn clear<'a>(&mut self, keys: impl Iterator<Item = &'a [u64]>) {
         match self {
-            Self::Direct(slots) => slots.fill(0),
+            Self::Direct(slots) => keys.for_each(|words| slots[words[0] as usize] = 0),
             Self::Hashed(table) => table.clear(),
             Self::Wide(map) => map.clear(),
         }

@@ -70,7 +70,7 @@ fn play(game: &Game, batch: &Batch, i: usize, between: Between, cancel: &CancelT
     let setup = batch.setup(i, game.n(), game.constrained());
     let row =
         Batch { dim: batch.dim, positions: setup.positions, visibility: setup.visibility, capture: setup.capture };
-    let policy = match Policy::new(game.clone(), TABLE_BYTES, cancel) {
+    let policy = match Policy::for_one(game.clone(), TABLE_BYTES, cancel) {
         Ok(policy) => policy,
         Err(EquilibriumError::FiniteEscape { escape_time, .. }) => return Ok(GameEnd::NoEquilibrium { escape_time }),
         Err(error) => return Err(error.into()),

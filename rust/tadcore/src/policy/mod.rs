@@ -79,7 +79,17 @@ impl Policy {
     /// [`EquilibriumError`] when the game has no equilibrium on [0, T], or the caller cancelled.
     pub fn new(game: Game, table_bytes: usize, cancel: &CancelToken) -> Result<Self, EquilibriumError> {
         let equilibrium = Arc::new(riccati::solve(&game, cancel)?);
-        Ok(Self::with(game, equilibrium, table_bytes, cancel)?)
+        Ok(Self::with(game, equilibrium, table_bytes, true, cancel)?)
+    }
+
+    /// The same for one trial, which passes every instant once: where P varies no transition is kept.
+    ///
+    /// # Errors
+    /// As [`Policy::new`].
+    pub(crate) fn for_one(game: Game, table_bytes: usize, cancel: &CancelToken) -> Result<Self, EquilibriumError> {
+        let equilibrium = Arc::new(riccati::solve(&game, cancel)?);
+        let kept = equilibrium.is_constant();
+        Ok(Self::with(game, equilibrium, table_bytes, kept, cancel)?)
     }
 
     /// The same game and equilibrium with empty tables.
@@ -87,7 +97,7 @@ impl Policy {
     /// # Errors
     /// [`Stopped`] when there is no memory, or `cancel` was raised.
     pub fn afresh(&self, cancel: &CancelToken) -> Result<Self, Stopped> {
-        Self::with(self.game.clone(), Arc::clone(&self.equilibrium), self.budget.capacity(), cancel)
+        Self::with(self.game.clone(), Arc::clone(&self.equilibrium), self.budget.capacity(), true, cancel)
     }
 
     /// Whether no thread is reading, writing or solving an entry. After a fork this is how a child finds out whether
@@ -101,13 +111,14 @@ impl Policy {
         game: Game,
         equilibrium: Arc<Equilibrium>,
         table_bytes: usize,
+        kept: bool,
         cancel: &CancelToken,
     ) -> Result<Self, Stopped> {
         // A constant P makes one instant of all.
         let steps = if equilibrium.is_constant() { 1 } else { game.grid().steps() };
         let instants = if equilibrium.is_constant() { 1 } else { steps + 1 };
         let (table, budget) = (Table::new(instants, cancel)?, Budget::new(table_bytes));
-        let transitions = Transitions::new(steps, game.constrained(), game.size(), cancel)?;
+        let transitions = Transitions::new(steps, game.constrained(), game.size(), kept, cancel)?;
         let (classes, anchors) = (SymmetryClasses::of(&game), Anchors::of(&equilibrium, cancel)?);
         Ok(Self { game, equilibrium, classes, budget, anchors, table, transitions })
     }

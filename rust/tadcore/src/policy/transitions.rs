@@ -95,6 +95,8 @@ pub(crate) struct Transitions {
     pub(super) hits: AtomicU64,
     pub(super) misses: AtomicU64,
     entries: AtomicUsize,
+    /// Whether anything is kept: not where every instant is passed once.
+    kept: bool,
 }
 
 /// The tables that one pass reads.
@@ -112,20 +114,33 @@ impl StepTables<'_> {
 }
 
 impl Transitions {
-    pub(super) fn new(steps: usize, rows: usize, size: usize, cancel: &CancelToken) -> Result<Self, Stopped> {
+    pub(super) fn new(
+        steps: usize,
+        rows: usize,
+        size: usize,
+        kept: bool,
+        cancel: &CancelToken,
+    ) -> Result<Self, Stopped> {
+        let tables = if kept { steps } else { 1 };
         Ok(Self {
-            tables: each(steps, || RwLock::new(StepTable::new(rows, size)), cancel)?,
-            claims: each(steps, Claims::default, cancel)?,
+            tables: each(tables, || RwLock::new(StepTable::new(rows, size)), cancel)?,
+            claims: each(tables, Claims::default, cancel)?,
             rates: each(steps, || AtomicU64::new(0), cancel)?,
             hits: AtomicU64::new(0),
             misses: AtomicU64::new(0),
             entries: AtomicUsize::new(0),
+            kept,
         })
     }
 
     /// Where an instant's entries are.
     fn at(&self, step: usize) -> usize {
         if self.tables.len() == 1 { 0 } else { step }
+    }
+
+    /// The rate of an instant.
+    fn rate_at(&self, step: usize) -> &AtomicU64 {
+        &self.rates[if self.rates.len() == 1 { 0 } else { step }]
     }
 
     /// Instants that have tables of their own.
@@ -147,12 +162,12 @@ impl Transitions {
 
     /// The largest ‖C‖ among the entries of an instant, or more: infinite for entries from a file.
     pub(crate) fn rate(&self, step: usize) -> f64 {
-        f64::from_bits(self.rates[self.at(step)].load(Ordering::Relaxed))
+        f64::from_bits(self.rate_at(step).load(Ordering::Relaxed))
     }
 
     /// Notes the ‖C‖ of an entry, at least 0.
     pub(super) fn note_rate(&self, step: usize, rate: f64) {
-        self.rates[self.at(step)].fetch_max(rate.to_bits(), Ordering::Relaxed);
+        self.rate_at(step).fetch_max(rate.to_bits(), Ordering::Relaxed);
     }
 
     /// What threads are solving at an instant.
@@ -191,6 +206,9 @@ impl Transitions {
         matrix: &[f64],
         budget: &Budget,
     ) -> bool {
+        if !self.kept {
+            return false;
+        }
         let mut table = self.tables[self.at(step)].write().unwrap_or_else(PoisonError::into_inner);
         if table.find(words) != 0 {
             return true;
