@@ -185,7 +185,7 @@ MUTANTS = {
         ("batches: block that moves", "blocks.z[«first * N * D»..]", "0"),
         ("batches: key of a half", "direct[«low[half]» as usize", "low[1 - half]"),
         ("batches: next key", "low[half] >>= «16»;", "8"),
-        ("batches: a topology that is missing", "all &= «slot != 0»;", "true"),
+        ("batches: a topology that is missing", "if «slot == 0» {", "false"),
     ],
     "ensemble/anysize.rs": [
         ("batches, any size: z_i − z_j", "«a[l] - b[l]»", "a[l] + b[l]"),

@@ -171,32 +171,3 @@ impl StepTable {
         self.canonical_forms.clear(std::iter::empty());
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// By the key itself, by a hash of one word, and of several: what is cleared is forgotten, and room again.
-    #[test]
-    fn a_cleared_table_knows_nothing_and_takes_entries_again() {
-        for (rows, size) in [(3, 4), (4, 5), (9, 9)] {
-            let mut table = StepTable::new(rows, size);
-            let words = |key: u64| vec![key; (rows * size).div_ceil(64)];
-            let matrix = |key: u64| vec![key as f64; size * padded(size)];
-            for round in 0..3 {
-                let keys = [0, 5, 77, 4095].map(|key: u64| (key + round) % 4096);
-                for &key in &keys {
-                    assert_eq!(table.find(&words(key)), 0);
-                    table.insert(&words(key), Some(&words(key)), &matrix(key)).expect("memory");
-                }
-                for &key in &keys {
-                    assert_eq!(table.matrix(table.find(&words(key)) as usize), matrix(key));
-                    assert_ne!(table.find_canonical(&words(key)), 0);
-                }
-                table.clear();
-                assert!((0..4096).all(|key| table.find(&words(key)) == 0 && table.find_canonical(&words(key)) == 0));
-                assert_eq!(table.len(), 0);
-            }
-        }
-    }
-}
