@@ -104,7 +104,9 @@ class Game:
         *,
         method: Literal["newton", "restarts", "descent"] = "newton",
         max_iterations: int | None = None,
+        gains: Literal["scalar", "turning", "mirror"] = "scalar",
     ) -> Gains: ...
+    """With gains other than "scalar" by Newton's method without a limit, in the plane."""
     def theta_price(self, steps: NDArray[np.int64], adjacency: NDArray[np.bool_]) -> NDArray[np.float64]: ...
     """(L,): Θ under "component" less Θ under "paper", at steps (L,) under adjacency (L, m, N)."""
     def simulate(
@@ -120,6 +122,7 @@ class Game:
         seed: int = 0,
         trial: int = 0,
         network: Callable[[int, float, NDArray[np.float64], NDArray[np.bool_]], NDArray[np.bool_]] | None = None,
+        gains: Literal["scalar", "turning", "mirror"] = "scalar",
     ) -> Record:
         """One recorded run; `network(k, t, positions, seen)` gives the adjacency in the place of what is seen."""
     def simulate_batch(
@@ -230,8 +233,14 @@ class Gains:
     def rows(self) -> NDArray[np.float64]: ...
     """(m, N): u_i = rows[i] @ z."""
     @property
+    def turn(self) -> NDArray[np.float64] | None: ...
+    """(m, N): u_i = rows[i] @ z + turn[i] @ Jz, J a quarter turn; None for scalar gains."""
+    @property
     def K(self) -> NDArray[np.float64]: ...
     """(m, N): the paper's scalar block factors, K_i 𝓘_i = rows[i]; zero on players not seen."""
+    @property
+    def K_turn(self) -> NDArray[np.float64] | None: ...
+    """(m, N): the factors of J in the paper's blocks; None for scalar gains."""
     @property
     def theta(self) -> float: ...
     @property
@@ -307,6 +316,9 @@ class Record:
     @property
     def gains(self) -> NDArray[np.float64]: ...
     """(L+1, m, N)."""
+    @property
+    def turn(self) -> NDArray[np.float64] | None: ...
+    """(L+1, m, N): the factors of Jz; None for scalar gains."""
     @property
     def theta(self) -> NDArray[np.float64]: ...
     @property

@@ -121,6 +121,43 @@ fn definiteness(form: impl Fn(&DMatrix<f64>) -> f64, directions: &[DMatrix<f64>]
     values.min() / values.amax()
 }
 
+/// Gains that turn, against Θ of full matrices: lower than scalars, and bitwise these where blocks are covered.
+#[test]
+fn gains_that_turn_have_the_theta_of_their_blocks() {
+    let (mut numbers, mut turned, mut kept) = (Numbers(11), 0, 0);
+    for round in 0..400 {
+        let game = game(Interaction::I1, 2 + round % 2, &mut numbers);
+        let cancel = CancelToken::new();
+        let Ok(equilibrium) = riccati::solve(&game, &cancel) else { continue };
+        let problem = Problem::new(&game, equilibrium.node(0), &cancel).expect("memory");
+        let (m, n) = (game.constrained(), game.size());
+        let drawn: Vec<bool> = (0..m * n).map(|_| numbers.next() > 0.6).collect();
+        let topology = Topology::from_fn(m, n, |i, j| drawn[i * n + j]);
+        let mut solver = Synthesizer::new();
+        let scalars = solver.solve(&problem, &topology, Options::default()).expect("memory");
+        let gains = solver.turn(&problem, &topology, &scalars).expect("memory");
+        if gains.turn.is_empty() {
+            assert_eq!((&gains.rows, gains.theta), (&scalars.rows, scalars.theta), "round {round}");
+            kept += 1;
+            continue;
+        }
+        assert!(!scalars.certified_blocks(&problem, &topology, &cancel).expect("memory"), "round {round}");
+        let [a, b] = [&gains.rows, &gains.turn].map(|rows| DMatrix::from_row_slice(m, n, rows));
+        let full = Full::new(&game, equilibrium.node(0));
+        for sign in [1.0, -1.0] {
+            let theta = 0.5 * full.theta(&(blocks(&a, ONE) + blocks(&(sign * &b), TURN)));
+            assert!((theta - gains.theta).abs() <= 1e-12 * theta, "round {round}: {theta:e}, {:e}", gains.theta);
+        }
+        assert!(gains.theta < scalars.theta, "round {round}");
+        let p = equilibrium.node(0);
+        let terms = problem.turning_terms(p, &gains.rows, &gains.turn, &cancel).expect("memory");
+        assert!((problem.weigh(&terms) - gains.theta).abs() <= 1e-12 * gains.theta, "round {round}");
+        turned += 1;
+    }
+    println!("{turned} turn, {kept} do not");
+    assert!(turned > 3 && kept > 50, "{turned} turn, {kept} do not");
+}
+
 #[test]
 fn gains_in_blocks_are_proved_where_the_form_of_blocks_that_turn_is_definite() {
     let (mut numbers, mut proved, mut open) = (Numbers(5), 0, 0);

@@ -14,9 +14,18 @@ from tadcore.errors import ScenarioError
 from .limits import COORDINATE, FINITE
 
 Floats: TypeAlias = NDArray[np.float64]
+Numbers: TypeAlias = NDArray[Any]
+"""Real, or complex where gains turn."""
 Integers: TypeAlias = NDArray[np.int64]
 
 _LISTED = 20
+
+
+def complex_of(real: Floats, imaginary: Floats) -> NDArray[np.complex128]:
+    """The complex numbers of two arrays, bitwise."""
+    out = np.empty(real.shape, dtype=np.complex128)
+    out.real, out.imag = real, imaginary
+    return out
 
 
 def as_plain_array(field: str, values: Any, rule: str) -> NDArray[Any]:

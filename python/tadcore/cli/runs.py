@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -16,6 +16,9 @@ from tadcore.scenario import worlds
 
 from .options import FAILED, Changes, Json, Quiet, Source, has_windows, naming, read, usable
 from .terminal import complain, emit, hush, say, sign_of_life, spill
+
+if TYPE_CHECKING:
+    from tadcore.game.synthesis import GainKind
 
 
 def simulate(
@@ -32,6 +35,10 @@ def simulate(
     ] = "sampled",
     seed: Annotated[int, typer.Option(help="What failures and disturbances are drawn from, with --trial.")] = 0,
     trial: Annotated[int, typer.Option(help="The trial of a study with that seed.")] = 0,
+    gains: Annotated[
+        str, typer.Option(metavar="KIND", help="scalar; or turning: blocks aI + bJ of lowest Θ, in the plane.")
+    ] = "scalar",
+    mirror: Annotated[bool, typer.Option("--mirror", help="The mirror images of turning gains.")] = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -60,9 +67,9 @@ def simulate(
     from tadcore.simulation.play import simulate as play
     from tadcore.simulation.termination import as_termination
 
-    with naming(termination=termination, seed=seed, trial=trial):
+    with naming(termination=termination, seed=seed, trial=trial, gains=gains, mirror=mirror):
         when = as_termination(termination)
-        run = play(sc, termination=when, seed=seed, trial=trial)
+        run = play(sc, termination=when, seed=seed, trial=trial, gains=cast("GainKind", gains), mirror=mirror)
     for line in _lines(run):
         say(line)
     if out is not None:

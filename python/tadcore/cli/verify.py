@@ -32,8 +32,8 @@ def verify(
         ),
     ] = 0,
     turning: Annotated[
-        int, typer.Option(min=0, max=_MOST, help="Descents in gains that turn at each instant; measure their gap.")
-    ] = 0,
+        bool, typer.Option("--turning", help="Measure the gap of gains that turn at each instant, and play with them.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the report there, as JSON.")] = None,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .recorded import Recorded
+from .recorded import Recorded, scalar_gains
 from .synthesis import synthesize
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def control_jumps(run: Recorded) -> xarray.Dataset:
     for e, k in enumerate(steps.tolist()):
         z = run.position[k, :-1] - run.position[k, -1]
         old = synthesize(sc, step=k, adjacency=run.adjacency[k - 1]).rows
-        jump[e] = (run.gains[k] - old) @ z
+        jump[e] = (scalar_gains(run)[k] - old) @ z
         own[e] = (run.adjacency[k] != run.adjacency[k - 1]).any(axis=1)
     changes = {change.time: change for change in run.network_changes[1:]}
     edges = []

@@ -11,7 +11,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, Numbers
+from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
 from .changes import Interval, NetworkChange
@@ -53,8 +54,8 @@ class Recorded(Protocol):
         """𝒜, shape (L + 1, m, N); the last row repeats the last network in force."""
 
     @property
-    def gains(self) -> Floats:
-        """Rows of the feedback, shape (L + 1, m, N)."""
+    def gains(self) -> Numbers:
+        """Rows of the feedback, shape (L + 1, m, N); complex where they may turn."""
 
     @property
     def theta(self) -> Floats:
@@ -82,3 +83,16 @@ class Recorded(Protocol):
 
     def intervals(self) -> tuple[Interval, ...]:
         """The stretches of time with one network."""
+
+
+def scalar_gains(run: Recorded) -> Floats:
+    """The gains of a run with scalar ones.
+
+    Raises
+    ------
+    ScenarioError
+        Its gains may turn.
+    """
+    if np.iscomplexobj(run.gains):
+        raise ScenarioError("run", "a run with turning gains", "one with scalar gains")
+    return run.gains

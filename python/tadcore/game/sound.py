@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, Numbers
 from tadcore.scenario.model import Scenario
 
 from .changes import Interval, NetworkChange, intervals_of
@@ -29,7 +29,7 @@ class Sound:
     position: Floats
     control: Floats
     adjacency: NDArray[np.bool_]
-    gains: Floats
+    gains: Numbers
     theta: Floats
     theta_terms: Floats
     passes: tuple[Pass, ...]

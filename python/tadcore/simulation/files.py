@@ -25,7 +25,7 @@ from tadcore.scenario import worlds
 from tadcore.scenario.provenance import provenance
 
 from .termination import Termination
-from .variants import Variant, told
+from .variants import TURNING_WORDS, Variant, told
 
 SUFFIX = ".nc"
 RECORD = "run"
@@ -42,6 +42,9 @@ SEAL = "sha256"
 
 VARIABLES = {"times": "time", "gains": "gain", "seen": "detected"}
 """Where a variable of the dataset is not called as the field of the run, or of its course."""
+
+TURNING = "gain_turning"
+"""The variable with the imaginary parts of gains that turn, which the file cannot hold beside the real ones."""
 
 _PAPER = "Singh and Reddy, Dynamic network analysis of a target defense differential game with limited observations"
 
@@ -115,7 +118,8 @@ def dataset_of(run: Written) -> xr.Dataset:
                 sees_of(run),
                 _about("whether a player sees another; not itself; who has no radius sees all", "", "eq:limob"),
             ),
-            "gain": (team, run.gains, _about("feedback rows, u_i = gain @ z", "K_i I_i", "eq:nwadapt")),
+            "gain": (team, run.gains.real, _about("feedback rows, u_i = gain @ z", "K_i I_i", "eq:nwadapt")),
+            **_turned(run),
             **_around(run),
         },
         coords={
@@ -155,6 +159,14 @@ def sees_of(run: Written) -> NDArray[np.bool_]:
     return sees
 
 
+def _turned(run: Written) -> dict[str, Any]:
+    """The imaginary parts of gains that turn; empty for scalar ones."""
+    if not np.iscomplexobj(run.gains):
+        return {}
+    about = _about("factors of a quarter turn J, u_i = gain @ z + gain_turning @ Jz", "", "eq:nwadapt")
+    return {TURNING: (("time", "observer", "entry"), run.gains.imag, about)}
+
+
 def _around(run: Written) -> dict[str, Any]:
     """What failed, who heard whom and what was displaced; empty for the paper's game."""
     if run.course is None:
@@ -183,11 +195,13 @@ def world_of(run: Written) -> dict[str, Any]:
 
 
 def variant_of(run: Written) -> dict[str, Any]:
-    """What a reader of a file must know of a run that is not the paper's game; empty for one that is."""
+    """What a reader of a file must know of a run by other rules than the default ones; empty for one by those."""
     if not run.variant:
         return {}
+    # Gains that turn are the paper's, whose blocks need not be scalars.
+    prefix = "" if run.variant in TURNING_WORDS.values() else "not the paper's game: "
     return {
-        "variant": f"not the paper's game: {told(run)}",
+        "variant": prefix + told(run),
         "hysteresis": run.hysteresis,
         "dwell": run.dwell,
         "termination": run.termination,

@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
+from tadcore._shared.arrays import complex_of
 from tadcore._shared.files import as_path, strange
 from tadcore.errors import ScenarioError
 from tadcore.game.course import ARRAYS, Course, shapes as course_shapes
 from tadcore.scenario.model import Scenario
 
-from .files import COURSE, OF_COURSE, RECORD, SEAL, VARIABLES, fields_of, seal
+from .files import COURSE, OF_COURSE, RECORD, SEAL, TURNING, VARIABLES, fields_of, seal
 from .hooks import as_seed, as_trial
 from .run import Run
 
@@ -87,6 +88,8 @@ def _unpacked(data: xr.Dataset, name: str) -> Run:
     if missing:
         raise ValueError(f"it has no variable {missing[0]}")
     values: dict[str, Any] = {field: np.ascontiguousarray(data[VARIABLES.get(field, field)].values) for field in arrays}
+    if TURNING in data:
+        values["gains"] = complex_of(values["gains"], np.ascontiguousarray(data[TURNING].values))
     course = _course(data, record.get(COURSE))
     run = Run(scenario=sc, **values, **rest, course=course)
     _check(run, name)
@@ -125,7 +128,7 @@ def _check(run: Run, name: str) -> None:
     if run.course is not None:
         entries += [(field, getattr(run.course, field), shape) for field, shape in course_shapes(sc, rows).items()]
     for field, array, shape in entries:
-        kind = np.dtype(bool if field in _BITS else np.float64)
+        kind = np.dtype(bool if field in _BITS else complex if field == "gains" and run.turning else np.float64)
         if array.shape != shape or array.dtype != kind or not np.isfinite(array).all():
             raise ScenarioError(f"{name}, {field}", f"{array.dtype} {array.shape}", f"finite {kind} of shape {shape}")
     if rows == 0 or run.times[0] != 0.0 or (np.diff(run.times) <= 0.0).any():

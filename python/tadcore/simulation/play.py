@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore._shared.arrays import as_amount
+from tadcore._shared.arrays import as_amount, complex_of
 from tadcore._shared.calls import public
 from tadcore.game.compiled import core_world, game_of
 from tadcore.game.course import Course, shapes
 from tadcore.game.divergence import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.game.passes import Pass
+from tadcore.game.synthesis import GainKind, as_gains
 from tadcore.scenario.model import Scenario
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
@@ -38,6 +39,8 @@ def simulate(
     seed: int = 0,
     trial: int = 0,
     network: Network | None = None,
+    gains: GainKind = "scalar",
+    mirror: bool = False,
 ) -> Run:
     """Play a scenario and record everything.
 
@@ -70,6 +73,14 @@ def simulate(
         what is seen, bool (m, N) as in `Run.adjacency`; it returns the network in use, of the same shape and type, in
         the place of ``sight`` and of what players report. The run says that its network came from outside. What the
         function raises ends the run.
+    gains : {"scalar", "turning"}
+        ``"turning"``, in the plane: at every instant the gains of ``tadcore.synthesize(…, gains="turning")``, blocks
+        aI + bJ where such have a lower Θ than scalars. Where none have, the run is bitwise that of scalar gains.
+    mirror : bool
+        Whether the mirror images aI - bJ of those gains are played, whose Θ is the same. From the mirror image of the
+        start they play the mirror image of the run.
+
+        Batches, studies and maps have scalar gains.
 
     Returns
     -------
@@ -82,8 +93,8 @@ def simulate(
         The game has no equilibrium on [0, T].
     ScenarioError
         `hysteresis` or `dwell` is negative or not finite, `termination` is neither of the two or cannot be had for
-        players who are disturbed, `seed` or `trial` is out of range, or `network` is no function, or returns something
-        else.
+        players who are disturbed, `seed` or `trial` is out of range, `network` is no function, or returns something
+        else, or gains are to turn in space.
 
     Examples
     --------
@@ -99,6 +110,7 @@ def simulate(
     key = {"seed": as_seed(seed), "trial": as_trial("trial", trial)}
     decide = as_network(network)
     sc = as_scenario(sc)
+    kind = as_gains(sc, gains, mirror=mirror)
     game = game_of(sc)
     refuse_between(sc, ending)
     record = game.simulate(
@@ -112,6 +124,7 @@ def simulate(
         seed=key["seed"],
         trial=key["trial"],
         network=decide,
+        gains=kind,
     )
     groups = ("defenders", "target", "attacker") if sc.interaction == "I1" else ("team",)
     return Run(
@@ -121,7 +134,7 @@ def simulate(
         position=record.position,
         control=record.control,
         adjacency=record.adjacency,
-        gains=record.gains,
+        gains=record.gains if record.turn is None else complex_of(record.gains, record.turn),
         theta=record.theta,
         theta_terms=record.theta_terms,
         costs=dict(zip(groups, map(float, record.costs), strict=True)),
@@ -131,6 +144,8 @@ def simulate(
         **rule,
         passes=tuple(Pass(None if who < 0 else who, *rest) for who, *rest in record.passes),
         termination=ending,
+        turning=kind != "scalar",
+        mirror=kind == "mirror",
         diverged=None if record.diverged is None else Divergence(*record.diverged),
         course=_course(sc, record, **key, from_outside=decide is not None),
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, Numbers
 from tadcore.game.changes import Interval, NetworkChange, changes_of, intervals_of
 from tadcore.game.chattering import Chatter
 from tadcore.game.course import Contact, Course, EdgeOutage, Outage, contacts, edge_outages, sensor_outages
@@ -20,7 +20,7 @@ from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
 
 from .termination import Termination
-from .variants import told
+from .variants import TURNING_WORDS, told
 
 if TYPE_CHECKING:
     import os
@@ -53,7 +53,8 @@ class Run:
         𝒜 at every instant: what each player used, seen by itself or reported to it; the last row repeats the last
         network in force.
     gains : ndarray, shape (L + 1, m, N)
-        Rows of the feedback of the players with limited sight.
+        Rows of the feedback of the players with limited sight, u_i = gains[k, i] @ z. Of a run with turning gains
+        complex: u_x + iu_y = gains[k, i] @ (z_x + iz_y).
     theta : ndarray, shape (L + 1,)
         Θ₁ or Θ₂, in reduced norms.
     theta_terms : ndarray, shape (L + 1, 4 or 3)
@@ -79,6 +80,8 @@ class Run:
         Rows of the record whose gains are proved to be globally optimal among scalar gains.
     hysteresis, dwell : float
         The rule by which edges form and break; zero in the paper's game. See `tadcore.simulate`.
+    turning, mirror : bool
+        Whether gains may turn, and whether their mirror images were played; see `tadcore.simulate`.
     course : Course or None
         What failed, who heard whom and what displaced the players; None where the scenario has no such tables and the
         network is its own.
@@ -90,7 +93,7 @@ class Run:
     position: Floats
     control: Floats
     adjacency: NDArray[np.bool_]
-    gains: Floats
+    gains: Numbers
     theta: Floats
     theta_terms: Floats
     costs: dict[str, float]
@@ -102,6 +105,8 @@ class Run:
     passes: tuple[Pass, ...] = ()
     termination: Termination = "sampled"
     diverged: Divergence | None = None
+    turning: bool = False
+    mirror: bool = False
     course: Course | None = None
 
     @property
@@ -155,10 +160,11 @@ class Run:
 
     @property
     def variant(self) -> str:
-        """What sets this run apart from the paper's game, in words; empty where nothing does."""
+        """What sets this run apart from one by the default rules, in words; empty where nothing does."""
         named = {"hysteresis": self.hysteresis, "dwell": self.dwell}
         words = [f"{name} {value:g}" for name, value in named.items() if value > 0.0]
         words += ["continuous termination"] if self.termination == "continuous" else []
+        words += [TURNING_WORDS[self.mirror]] if self.turning or self.mirror else []
         outside = self.course is not None and self.course.from_outside
         return " and ".join([*words, *(["a network from outside"] if outside else [])])
 

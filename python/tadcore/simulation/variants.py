@@ -1,8 +1,11 @@
-"""What sets a run apart from the paper's game, in words."""
+"""What sets a run apart from one by the default rules, in words."""
 
 from __future__ import annotations
 
 from typing import Protocol
+
+TURNING_WORDS = {False: "turning gains", True: "mirrored turning gains"}
+"""Gains that turn, and whether their mirror images are played."""
 
 
 class Variant(Protocol):

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import as_flag, as_index
 from tadcore._shared.calls import public
 from tadcore.errors import NoEquilibriumError, ScenarioError, TadcoreError
 from tadcore.game.equilibrium import solve_equilibrium
@@ -42,7 +42,7 @@ def verify(
     starts: int = 0,
     seed: int = 0,
     bound: Literal[0, 1, 2] | bool = 0,
-    turning: int = 0,
+    turning: bool = False,
 ) -> VerificationReport:
     """Check the paper's theorems on a scenario or on a run.
 
@@ -63,10 +63,10 @@ def verify(
         instants, in milliseconds each; needs Clarabel, the extra ``bounds``. 2: at every instant, each bound proved in
         exact arithmetic; the paper's runs take minutes, and an instant at which more than 9 unknowns do not decouple
         is counted as not tried.
-    turning : int
-        Descents in gains that turn, aI + bJ, at each instant of a run in the plane at which no certificate covers them;
-        none by default, since they take minutes. Their gap to the scalar gains is measured, and where there is one the
-        game is played with them, too.
+    turning : bool
+        Whether to search for gains that turn, aI + bJ, at each instant of a run in the plane at which no certificate
+        covers them: it takes seconds. Their gap to the scalar gains is measured, and the game is played with them and
+        with their mirror images, too (``tadcore.simulate(…, gains="turning")``).
 
     Returns
     -------
@@ -97,7 +97,7 @@ def verify(
     instants = as_index("instants", instants, _MOST)
     starts = as_index("starts", starts, _MOST)
     seed = as_seed(seed)
-    turning = as_index("turning", turning, _MOST)
+    turning = as_flag("turning", turning)
     if not isinstance(bound, int | np.integer) or bound not in (0, 1, 2):
         raise ScenarioError("bound", bound, "0, 1 or 2: the order of the relaxation")
     order = int(bound)
@@ -153,7 +153,7 @@ def verify(
             "gains",
             lambda: check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed, bound=order),
         ),
-        *([family("turning", lambda: check_turning(run, starts=turning, seed=seed))] if turning else []),
+        *([family("turning", lambda: check_turning(run))] if turning else []),
         family("geometry", lambda: check_geometry(run, seed=seed)),
         family("decentral", lambda: check_decentral(run)),
     ]

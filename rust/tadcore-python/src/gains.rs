@@ -21,6 +21,11 @@ impl Gains {
     pub(crate) fn new(gains: CoreGains, terms: Vec<f64>, certified_blocks: bool, topology: Topology) -> Self {
         Self { gains, terms, certified_blocks, topology }
     }
+
+    fn part<'py>(&self, py: Python<'py>, turn: &[f64]) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let shape = (self.topology.rows(), self.topology.size());
+        if turn.is_empty() { Ok(None) } else { shaped(py, turn, shape).map(Some) }
+    }
 }
 
 #[pymethods]
@@ -29,6 +34,19 @@ impl Gains {
     #[getter]
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         guarded(|| shaped(py, &self.gains.rows, (self.topology.rows(), self.topology.size())))
+    }
+
+    /// The factors of Jz in gains that turn, shape (m, N): u_i = rows[i] @ z + turn[i] @ Jz; `None` for scalar gains.
+    #[getter]
+    fn turn<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        guarded(|| self.part(py, &self.gains.turn))
+    }
+
+    /// The factors of J in the paper's K, shape (m, N); `None` for scalar gains.
+    #[getter]
+    #[allow(non_snake_case)]
+    fn K_turn<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        guarded(|| self.part(py, &self.gains.paper_turn(&self.topology)))
     }
 
     /// Scalar factors of the paper's K, shape (m, N).

@@ -10,7 +10,7 @@ use pyo3::types::{PyBytes, PyDict};
 use tadcore::ensemble::{self, Batch, Between, Lineages};
 use tadcore::game::{Criterion, Game as CoreGame, Grid, Interaction, Weights};
 use tadcore::network::{EdgeRule, Topology};
-use tadcore::policy::{DEFAULT_TABLE_BYTES, Policy};
+use tadcore::policy::{DEFAULT_TABLE_BYTES, GainKind, Policy};
 use tadcore::simulation::{self, Chances, Rules, Setup, Termination};
 use tadcore::synthesis::{Method, Options, Synthesizer};
 
@@ -39,6 +39,15 @@ fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
 
 pub(crate) fn termination(continuous: bool) -> Termination {
     if continuous { Termination::Continuous } else { Termination::Sampled }
+}
+
+fn gain_kind(gains: &str) -> PyResult<GainKind> {
+    match gains {
+        "scalar" => Ok(GainKind::Scalar),
+        "turning" => Ok(GainKind::Turning),
+        "mirror" => Ok(GainKind::Mirror),
+        other => Err(PyValueError::new_err(format!("gains is {other:?}; it must be scalar, turning or mirror"))),
+    }
 }
 
 impl Game {
@@ -152,8 +161,8 @@ impl Game {
         guarded(|| Ok(Equilibrium::new(self.policy(py)?)))
     }
 
-    /// The gains at t_step under an adjacency of shape (m, N).
-    #[pyo3(signature = (step, adjacency, *, method="newton", max_iterations=None))]
+    /// The gains at t_step under an adjacency of shape (m, N); those of `gains` turning or mirror by Newton's method alone.
+    #[pyo3(signature = (step, adjacency, *, method="newton", max_iterations=None, gains="scalar"))]
     fn synthesize(
         &self,
         py: Python<'_>,
@@ -161,6 +170,7 @@ impl Game {
         adjacency: PyReadonlyArray2<'_, bool>,
         method: &str,
         max_iterations: Option<usize>,
+        gains: &str,
     ) -> PyResult<Gains> {
         guarded(|| {
             let seen = adjacency.as_array();
@@ -184,11 +194,20 @@ impl Game {
                 options.max_iterations = limit;
             }
             let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
-            let policy = self.policy(py)?;
+            let (kind, policy) = (gain_kind(gains)?, self.policy(py)?);
+            if kind != GainKind::Scalar && options.is_some() {
+                return Err(PyValueError::new_err(format!(
+                    "gains is {gains:?}; method must be newton, without a limit"
+                )));
+            }
             let (gains, terms, blocks) = detach::interruptible(py, |cancel| {
                 let (mut solver, problem) = (Synthesizer::new(), policy.problem(step, cancel)?);
-                let gains = policy.gains(step, &topology, options, &mut solver, cancel)?;
-                let terms = problem.terms(policy.equilibrium().node(step), &gains.rows, cancel)?;
+                let gains = match kind {
+                    GainKind::Scalar => policy.gains(step, &topology, options, &mut solver, cancel)?,
+                    _ => policy.turning_gains(step, &topology, &mut solver, cancel)?.of(kind),
+                };
+                let p = policy.equilibrium().node(step);
+                let terms = problem.turning_terms(p, &gains.rows, &gains.turn, cancel)?;
                 let blocks = gains.certified_blocks(&problem, &topology, cancel)?;
                 Ok((gains, terms, blocks))
             })?
@@ -230,7 +249,7 @@ impl Game {
 
     /// One recorded run; with a hysteresis, a dwell time, a world or a network from outside another game than the paper's.
     #[pyo3(signature = (positions, visibility_radii, capture_radii, *, hysteresis=0.0, dwell=0.0, continuous=false,
-        world=None, seed=0, trial=0, network=None))]
+        world=None, seed=0, trial=0, network=None, gains="scalar"))]
     // A keyword for each rule.
     #[allow(clippy::too_many_arguments)]
     fn simulate(
@@ -246,12 +265,13 @@ impl Game {
         seed: u64,
         trial: u64,
         network: Option<Py<PyAny>>,
+        gains: &str,
     ) -> PyResult<Record> {
         guarded(|| {
             let dim = positions.as_array().ncols();
             let flat = copied(py, &positions)?;
             let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
-            let policy = self.policy(py)?;
+            let (kind, policy) = (gain_kind(gains)?, self.policy(py)?);
             let world = world.map(|world| world.get().core());
             let outside = network.map(|function| Outside::new(function, &self.game, dim));
             let record = detach::interruptible(py, |cancel| {
@@ -259,6 +279,7 @@ impl Game {
                 let rules = Rules {
                     edges: EdgeRule { hysteresis, dwell },
                     termination: termination(continuous),
+                    gains: kind,
                     chances: world.map(|world| Chances { world, seed, trial }),
                     outside: outside.as_ref().map(Outside::network),
                 };

@@ -158,6 +158,16 @@ impl Record {
         guarded(|| shaped(py, &self.record.gains, (self.rows(), game.constrained(), game.size())))
     }
 
+    /// The factors of Jz, shape (L + 1, m, N); `None` for scalar gains.
+    #[getter]
+    fn turn<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        if self.record.turn.is_empty() {
+            return Ok(None);
+        }
+        let game = self.policy.game();
+        guarded(|| shaped(py, &self.record.turn, (self.rows(), game.constrained(), game.size())).map(Some))
+    }
+
     /// Θ at each row, reduced.
     #[getter]
     fn theta<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {

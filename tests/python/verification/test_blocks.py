@@ -8,7 +8,6 @@ import tadcore
 from oracle.scenario import as_mapping
 from samples import random_game, random_network, random_start
 from tadcore import verification as v
-from tadcore.verification.checks import turning as turning_module
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 
@@ -150,42 +149,25 @@ def test_where_nothing_is_certified_neither_flag_is_set():
     assert not stopped.certified_blocks
 
 
-def without_turning(sc):
-    """A search that finds nothing but the scalars."""
-    search = turning_module._Search(sc, 1, 0)
-
-    def scalars(k, adjacency):
-        rows = tadcore.synthesize(sc, step=k, adjacency=adjacency).rows
-        return turning_module._Found(rows.astype(complex), True, 0.0)
-
-    search._find = scalars
-    return search
-
-
-@pytest.mark.parametrize("name", ["paper-i1", "paper-i2"])
-def test_the_complex_game_with_scalar_gains_is_the_recorded_run(name):
-    sc = tadcore.scenarios.load(name)
-    assert turning_module.play_turning(sc, without_turning(sc), mirror=True) == tadcore.simulate(sc).outcome
-
-
-def test_of_two_mirror_images_the_first_is_taken_and_both_have_the_same_theta():
+def test_both_mirror_images_are_critical_in_full_blocks_and_no_full_blocks_are_lower():
     sc, k, network = turning()
     objective = full(sc, k, network)
-    rows = tadcore.synthesize(sc, step=k, adjacency=network).rows
-    theta, gains = turning_module.lowest_turning(objective, rows, 6, np.random.default_rng(0))
-    assert gains.imag[np.flatnonzero(np.abs(gains.imag) > 1e-8)[0]] > 0
-    for image in (gains, gains.conj()):
-        blocks = np.concatenate([[g.real, -g.imag, g.imag, g.real] for g in image])
-        assert objective.theta(blocks) == pytest.approx(theta, rel=1e-9)
-        assert np.abs(objective.gradient(blocks)).max() < 1e-6 * objective.gradient_scale(blocks)
-    # no lower in full blocks, either
-    best = v.multistart(objective, objective.blocks(rows), 12, np.random.default_rng(1))
-    assert theta == pytest.approx(best, rel=1e-7)
+    gains, mirror = (
+        tadcore.synthesize(sc, step=k, adjacency=network, gains="turning", mirror=mirror) for mirror in (False, True)
+    )
+    for image in (gains, mirror):
+        K = np.stack([image.K[label].reshape(2, -1, 2).transpose(1, 0, 2) for label in image.players])
+        blocks = np.concatenate([K[i, j].ravel() for i, j in objective.seen])
+        assert objective.theta(blocks) == pytest.approx(gains.theta, rel=1e-12)
+        assert np.abs(objective.gradient(blocks)).max() < 1e-10 * objective.gradient_scale(blocks)
+    scalars = tadcore.synthesize(sc, step=k, adjacency=network).rows
+    best = v.multistart(objective, objective.blocks(scalars), 12, np.random.default_rng(1))
+    assert gains.theta == pytest.approx(best, rel=1e-7)
 
 
 def test_along_a_game_of_which_turning_gains_are_lower_the_study_says_so():
     sc, _, _ = turning()
-    study = v.turning_study(sc, starts=2, progress=False)
+    study = v.turning_study(sc, progress=False)
     assert (study.instants, study.covered, study.lower) == (60, 57, 3)
     assert study.widest == pytest.approx(0.00603, abs=1e-5)
     assert f"{study.lower} of {study.instants}" in repr(study)
@@ -202,26 +184,29 @@ def test_gains_turn_in_the_plane_alone():
         v.turning_study(space)
 
 
-def test_no_run_of_the_paper_has_gains_that_turn():
+def test_along_no_run_of_the_paper_do_descents_in_full_blocks_find_less():
     """At every tenth instant: in I1 it is proved; in I2, where no certificate covers blocks, descents find none."""
     uncovered = 0
     for name in tadcore.scenarios.names():
         run = tadcore.simulate(name)
-        sc, search = run.scenario, turning_module._Search(run.scenario, 2, 0)
-        open_at = []
+        sc, open_at = run.scenario, []
         for k in range(0, len(run.times) - 1, 10):
-            if not tadcore.synthesize(sc, step=k, adjacency=run.adjacency[k]).certified_blocks:
+            gains = tadcore.synthesize(sc, step=k, adjacency=run.adjacency[k], gains="turning")
+            assert not gains.turns
+            if not gains.certified_blocks:
                 open_at.append(k)
         uncovered += len(open_at)
         for k in open_at[:: max(len(open_at) // 2, 1)]:
-            assert search.at(k, run.adjacency[k]).gap == 0.0
+            objective = full(sc, k, run.adjacency[k])
+            best = v.multistart(objective, objective.blocks(run.gains[k]), 2, np.random.default_rng(k))
+            assert best > run.theta[k] * (1 - 1e-8)
         if sc.interaction == "I1":
             assert not open_at  # proved
     assert uncovered > 10
 
 
 def test_verify_measures_the_gap_and_says_whether_the_outcome_depends_on_it():
-    report = v.verify(turning()[0], deviations=0, instants=1, turning=2)
+    report = v.verify(turning()[0], deviations=0, instants=1, turning=True)
     (gap,) = [m for m in report.measurements if m.name == "turning.gap"]
     assert gap.value == pytest.approx(0.00603, abs=1e-5)
     assert any("does not depend on the choice of gains" in note for note in report.notes)

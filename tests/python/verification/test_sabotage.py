@@ -338,6 +338,10 @@ def test_nothing_that_a_run_carries_is_left_unchecked(run, field):
         with pytest.raises(tadcore.ScenarioError, match="continuous"):
             tadcore.verify(dataclasses.replace(run, termination="continuous"))
         return
+    elif field in ("turning", "mirror"):
+        with pytest.raises(tadcore.ScenarioError, match="turning gains"):
+            tadcore.verify(dataclasses.replace(run, **{field: True}))
+        return
     elif field == "passes":
         other = (*found, "d1 passes at t = 0")
     elif field == "adjacency":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -28,7 +29,8 @@ def gains(
     r"""Draw the rows :math:`g_i` of the feedback :math:`u_i = g_i z`, a panel per player with limited sight.
 
     The curve in the colour and dashes of player :math:`j` is the weight that player :math:`i` gives to
-    :math:`z_j = X_j - X_a`; it jumps where the network changes.
+    :math:`z_j = X_j - X_a`; it jumps where the network changes. Of gains that turn, :math:`a + ib`, it is :math:`a`,
+    and a thinner, paler curve is :math:`b`, the weight of :math:`Jz_j`.
 
     Parameters
     ----------
@@ -58,7 +60,10 @@ def gains(
     for i, (ax, observer) in enumerate(zip(panels, observers, strict=False)):
         for j, player in enumerate(entries):
             it = look(player)
-            ax.plot(run.times, run.gains[:, i, j], color=it.colour, linestyle=it.dashes, linewidth=0.5 if thin else 1.1)
+            curve, width = run.gains[:, i, j], 0.5 if thin else 1.1
+            ax.plot(run.times, curve.real, color=it.colour, linestyle=it.dashes, linewidth=width)
+            if np.iscomplexobj(curve) and curve.imag.any():
+                ax.plot(run.times, curve.imag, color=it.colour, linestyle=it.dashes, linewidth=0.5 * width, alpha=0.7)
         ax.axhline(0.0, color=ink(0.7), linewidth=0.5, zorder=1.0)
         ax.set(xlim=span(run.times), ylabel=f"$g_{{{symbol(observer)}}}$")
         ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))

@@ -8,6 +8,7 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.progress import bar
+from tadcore.game.recorded import scalar_gains
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.criterion import held
 from tadcore.verification.oracle.matrices import matrices_of
@@ -82,6 +83,6 @@ def bound_along(run: Run, values: Floats, *, progress: bool = True) -> AlongRun:
             groups[network] = largest_group(objective)
         # Θ over all rows may lie below that under the team criterion, and proves nothing of it.
         if groups[network] <= MOST and not held(sc, adjacency).any():
-            found[k] = prove_theta(objective, run.gains[k], near.get(network), deep=True)
+            found[k] = prove_theta(objective, scalar_gains(run)[k], near.get(network), deep=True)
             near[network] = found[k].proof
     return AlongRun(found, length)

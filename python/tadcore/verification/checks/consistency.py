@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import scalar_gains
 from tadcore.game.synthesis import synthesize, theta_terms
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.criterion import held
@@ -59,7 +60,7 @@ def _team(run: Run, own: Floats, scale: float) -> Check:
     """How far the rows of players that know everything are from the equilibrium, under the team criterion."""
     length = len(own[: len(run.times) - 1])
     whole = held(run.scenario, run.adjacency[:length])
-    off = np.where(whole, np.abs(run.gains[:length] - own[:length]).max(axis=2), 0.0) / scale
+    off = np.where(whole, np.abs(scalar_gains(run)[:length] - own[:length]).max(axis=2), 0.0) / scale
     k, i = np.unravel_index(int(np.argmax(off)), off.shape)
     remedy = "who knows everything must play its row of the equilibrium: the paper's criterion was used"
     where = f"{np.count_nonzero(whole)} rows" + (
@@ -109,7 +110,7 @@ def check_consistency(run: Run, equilibrium: FeedbackSolution) -> VerificationRe
         expected = own[full] @ z
         rounded = 4.0 * float(np.finfo(np.float64).eps) / _ROWS * float(np.abs(run.position).max())
         size = scale * max(float(np.abs(z).max()) + rounded, 1e-300)
-        off = float(np.abs(run.gains[full] - own[full]).max()) / scale
+        off = float(np.abs(scalar_gains(run)[full] - own[full]).max()) / scale
         control = float(np.abs(run.control[full, :m] - expected).max()) / size
         where = f"{len(full)} of {length} instants"
         least = float(run.theta[full].max()) / largest

@@ -18,6 +18,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tadcore._shared.arrays import Floats
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.recorded import scalar_gains
 from tadcore.game.synthesis import synthesize
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.run import Run
@@ -105,7 +106,7 @@ def check_gains(
     unconverged = float(run.unconverged)
     checks = [Check("gains.solver", unconverged, 0.0, True, remedy, label, "instants short of the tolerance")]
 
-    slopes = optimality(sc, m, values[:, :length], run.adjacency[:length], run.gains[:length]).gradient
+    slopes = optimality(sc, m, values[:, :length], run.adjacency[:length], scalar_gains(run)[:length]).gradient
     at = int(np.argmax(slopes))
     steepest = float(slopes[at])
     remedy = "the gains are not critical points of Θ: they are not what the synthesis gives"
@@ -116,7 +117,7 @@ def check_gains(
     flattest, lower, worst, where_lower = np.inf, 0.0, 0.0, 0
     for k in chosen:
         objective = FullObjective(sc, m, values[:, k], run.adjacency[k], team=True)
-        x = objective.blocks(run.gains[k])
+        x = objective.blocks(scalar_gains(run)[k])
         low, high = lowest_curvature(objective, x)
         if high > 0:
             flattest = min(flattest, low / high)

@@ -15,6 +15,7 @@ import numpy as np
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.recorded import scalar_gains
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.play import simulate
 from tadcore.simulation.run import Run
@@ -198,7 +199,7 @@ def _rounding(run: Run, reach: float) -> float:
     """
     sc, m = run.scenario, matrices_of(run.scenario)
     rows = stacked_rows(solve_equilibrium(sc).feedback, sc.players)[: len(run.times)]
-    rows[:, : run.gains.shape[1]] = run.gains
+    rows[:, : scalar_gains(run).shape[1]] = scalar_gains(run)
     with np.errstate(over="ignore", invalid="ignore"):
         transition, _ = frozen_steps(m.B @ rows[:-1], sc.horizon / sc.steps)
         carried, grown = np.eye(m.size), 1.0

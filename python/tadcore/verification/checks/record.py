@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tadcore.game.recorded import scalar_gains
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.matrices import FeedbackSolution, matrices_of, stacked_rows
 from tadcore.verification.oracle.optimality import optimality
@@ -45,14 +46,14 @@ def check_record(run: Run, equilibrium: FeedbackSolution) -> VerificationReport:
     m, length = matrices_of(run.scenario), len(run.times)
     values = m.values(equilibrium.P)[:, :length]
     rows = stacked_rows(equilibrium.feedback, run.scenario.players)[:length]
-    rows[:, : run.gains.shape[1]] = run.gains
+    rows[:, : scalar_gains(run).shape[1]] = scalar_gains(run)
     checks = [whole, check_start(run), check_times(run), check_outcome(run), check_divergence(run)]
     checks += [check_network(run)] if run.course is None else check_around(run)
     checks += [check_admissible(run)]
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows decides nothing
         if length > 1:
             checks += [*check_motion(run, m, rows), check_control(run, rows), check_theta(run, m, values)]
-        found = optimality(run.scenario, m, values, run.adjacency, run.gains)
+        found = optimality(run.scenario, m, values, run.adjacency, scalar_gains(run))
         checks += [check_costs(run, m, rows), check_last_row(run, m, values, rows, found)]
         checks += [check_certified(run, found), check_synthesis(run)]
     return VerificationReport("record", tuple(checks))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.recorded import scalar_gains
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.indices import adapted_weights, theta_terms
@@ -49,7 +50,7 @@ def network_errors(sc: Scenario, at: Floats, adjacency: NDArray[np.bool_]) -> Fl
 def check_admissible(run: Run) -> Check:
     """The largest part of a gain outside what the network lets its player use, relative to its row."""
     last = max(len(run.times) - 1, 1)
-    blind = unseen(run.gains[:last], run.adjacency[:last])
+    blind = unseen(scalar_gains(run)[:last], run.adjacency[:last])
     k, i = np.unravel_index(int(np.argmax(blind)), blind.shape)
     where = f"{run.scenario.players[i]} at t = {run.times[k]:.6g}" if blind[k, i] else ""
     return RECORD["record.admissible"].judge(float(blind[k, i]), where)
@@ -87,7 +88,7 @@ def check_control(run: Run, rows: Floats) -> Check:
 
 def theta_errors(run: Run, m: Matrices, values: Floats, part: slice) -> Floats:
     """How far Θ and its terms are from those of the gains, shape (rows,), relative to Θ of them or at rest."""
-    sc, P, G = run.scenario, values[:, part], run.gains[part]
+    sc, P, G = run.scenario, values[:, part], scalar_gains(run)[part]
     terms = theta_terms(sc, adapted_weights(sc, m, P, G))
     still = theta_terms(sc, adapted_weights(sc, m, P, np.zeros_like(G)))  # the size of what cancels
     largest = np.maximum(np.maximum(still, terms).max(axis=1), TINY)
@@ -108,7 +109,7 @@ def check_last_row(run: Run, m: Matrices, values: Floats, rows: Floats, found: O
     Gains are accepted that are as critical as those of the rows before: ``gains.gradient`` says how critical these are.
     """
     last = slice(len(run.times) - 1, None)
-    network, gains = run.adjacency[last], run.gains[last]
+    network, gains = run.adjacency[last], scalar_gains(run)[last]
     if len(run.times) > 1:
         changed = float((network[0] != run.adjacency[-2]).any())
     else:

@@ -31,6 +31,7 @@ import numpy as np
 from tadcore._shared.arrays import Floats
 from tadcore.errors import ScenarioError
 from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.recorded import scalar_gains
 from tadcore.simulation.run import Run
 
 from .flow import integral, propagate, riccati_within
@@ -122,7 +123,7 @@ class Adapted:
         self.m: Matrices = matrices_of(sc)
         eq = solve_equilibrium(sc) if equilibrium is None else equilibrium
         self.grid = self.m.values(eq.P)[:, : self.length + 1]
-        self.gains = run.gains[: self.length]
+        self.gains = scalar_gains(run)[: self.length]
         self.start = run.position[0, :-1] - run.position[0, -1]
         # a stiff step is cut into pieces, each with its own nodes
         stiff = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max()) * sc.horizon / sc.steps

@@ -5,7 +5,8 @@
 //! rounding and Gauss–Legendre quadrature of matching order integrates it exactly. Elsewhere large parts may cancel in
 //! a cost, so it is computed from S = ∫zzᵀdt in double-double arithmetic and rounded once, in the end.
 //!
-//! Costs carry all axes: they are the paper's own J, not a reduced factor.
+//! Costs carry all axes: they are the paper's own J, not a reduced factor. Over a step whose gains turn z and Jz are
+//! integrated together, J a quarter turn (see `policy::closed_loop`).
 
 mod double_double;
 mod moments;
@@ -15,12 +16,14 @@ use double_double::{DoubleDouble, Numbers};
 use moments::{Motion, effort};
 use quadrature::weighted;
 
+use std::borrow::Cow;
+
 use crate::cancel::CancelToken;
 use crate::error::{RunError, Stopped};
 use crate::game::{Game, Interaction};
 use crate::memory::{append, zeros};
-use crate::policy::{Policy, closed_loop};
-use crate::simulation::Record;
+use crate::policy::{GainKind, Policy, closed_loop};
+use crate::simulation::{Record, acted_on};
 
 /// What asks for memory here.
 const WHAT: &str = "the costs of one run";
@@ -42,27 +45,39 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
     let mut total = vec![0.0; running.len()];
     let mut stiff: Option<Vec<DoubleDouble>> = None;
     let mut rows = Vec::new();
-    let mut c = zeros(WHAT, size * size)?;
+    let mut c = zeros(WHAT, size * size * if record.kind == GainKind::Scalar { 1 } else { 4 })?;
     for k in 0..record.steps {
         cancel.check()?;
-        let gains = &record.gains[k * m * size..(k + 1) * m * size];
-        let free = policy.free_rows(k);
-        closed_loop::matrix(&free, gains, &mut c);
+        let of_step = k * m * size..(k + 1) * m * size;
+        let (mut gains, mut free) = (Cow::from(&record.gains[of_step.clone()]), policy.free_rows(k));
+        // The recorded imaginary parts are on Jz, also those of a mirror image.
+        let turn = record.turn.get(of_step).filter(|turn| turn.iter().any(|x| *x != 0.0));
+        if let Some(turn) = turn {
+            gains = closed_loop::beside_turned(&gains, turn, size).into();
+            free = free.beside_turned();
+        }
+        let kind = if turn.is_some() { GainKind::Turning } else { GainKind::Scalar };
+        let width = free.attacker.len();
+        let c = &mut c[..width * width];
+        closed_loop::matrix(&free, &gains, c);
         rows.clear();
-        append(WHAT, &mut rows, gains)?;
+        append(WHAT, &mut rows, &gains)?;
         append(WHAT, &mut rows, free.target.as_deref().unwrap_or_default())?;
         append(WHAT, &mut rows, &free.attacker)?;
         // A game that ended at a crossing ends within its last step, which a record that stops before does not hold.
         let cut = (k == record.end && record.after > 0.0).then_some(record.after);
         let step = cut.unwrap_or(grid.step());
-        if closed_loop::norm(&c, size) * step <= ORDINARY {
+        if closed_loop::norm(c, width) * step <= ORDINARY {
             let z = relative(record, k, size, dim);
-            quadrature::add_step(policy, &running, (&c, &rows), (&z, dim, step), &mut total);
+            quadrature::add_step(policy, &running, (c, &rows), (&acted_on(&z, kind), dim, step), &mut total);
             continue;
         }
         let step = cut.map_or(DoubleDouble::quotient(grid.horizon(), grid.steps() as f64), DoubleDouble::exact);
         let total = stiff.get_or_insert_with(|| vec![DoubleDouble::ZERO; running.len()]);
         let mut z = exact_state(record, k, size, dim)?;
+        if turn.is_some() {
+            z = beside_turned(&z, size)?;
+        }
         let s = Motion::new(&rows, size, dim, cancel)?.over_step(&mut z, step)?;
         add_stiff_step(game, &running, &rows, &s, total, cancel)?;
     }
@@ -111,6 +126,19 @@ fn exact_state(record: &Record, k: usize, size: usize, dim: usize) -> Result<Num
     Ok(z)
 }
 
+/// z and Jz in the plane, axis by axis.
+fn beside_turned(z: &Numbers, size: usize) -> Result<Numbers, Stopped> {
+    let mut both = Numbers::zeros(4 * size)?;
+    for i in 0..size {
+        let (x, y) = (z.at(i), z.at(size + i));
+        both.set(i, x);
+        both.set(size + i, y.times(DoubleDouble::exact(-1.0)));
+        both.set(2 * size + i, y);
+        both.set(3 * size + i, x);
+    }
+    Ok(both)
+}
+
 /// Adds to `total` what a step with the moments S costs each player.
 fn add_stiff_step(
     game: &Game,
@@ -120,8 +148,9 @@ fn add_stiff_step(
     total: &mut [DoubleDouble],
     cancel: &CancelToken,
 ) -> Result<(), Stopped> {
-    let (n, size, w) = (game.n(), game.size(), game.weights());
-    let mut efforts = Vec::with_capacity(size + 1);
+    let (n, w) = (game.n(), game.weights());
+    let size = rows.len() / (n + 2);
+    let mut efforts = Vec::with_capacity(n + 2);
     for row in rows.chunks_exact(size) {
         cancel.check()?;
         efforts.push(effort(s, row)?);

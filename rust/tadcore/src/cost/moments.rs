@@ -33,11 +33,22 @@ pub(super) struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    /// C of the feedback `rows` of all players, the attacker's last; z has `dim` axes.
-    pub fn new(rows: &[f64], n: usize, dim: usize, cancel: &'a CancelToken) -> Result<Self, Stopped> {
+    /// C of the feedback `rows` of the `players` and, the last, the attacker; z has `dim` axes. Rows of twice as many entries
+    /// are on z and Jz, and so is C.
+    pub fn new(rows: &[f64], players: usize, dim: usize, cancel: &'a CancelToken) -> Result<Self, Stopped> {
+        let n = rows.len() / (players + 1);
         let mut transposed = Numbers::zeros(n * n)?;
-        let (own, attacker) = rows.split_at(rows.len() - n);
-        let entry = |ij: usize| DoubleDouble::difference(own[ij], attacker[ij % n]);
+        let (own, attacker) = rows.split_at(players * n);
+        let entry = |ij: usize| {
+            let (i, j) = (ij / n, ij % n);
+            // The rows of Jz: J(Az + BJz) = AJz − Bz.
+            let (i, other, sign) = match (i < players, j < players) {
+                (true, _) => (i, j, 1.0),
+                (false, true) => (i - players, j + players, -1.0),
+                (false, false) => (i - players, j - players, 1.0),
+            };
+            DoubleDouble::difference(sign * own[i * n + other], sign * attacker[other])
+        };
         (0..n * n).for_each(|ij| transposed.set(ij % n * n + ij / n, entry(ij)));
         let sizes = (0..n * n).map(|ij| entry(ij).hi.abs()).collect();
         Ok(Self { width: Width::in_use(), n, dim, transposed, sizes, cancel })

@@ -26,7 +26,7 @@ pub(super) fn add_step(
     (z, dim, h): (&[f64], usize, f64),
     total: &mut [f64],
 ) {
-    let series = expansion(c, z, policy.game().size(), dim, h);
+    let series = expansion(c, z, z.len() / dim, dim, h);
     for (s, weight) in GAUSS {
         let at = evaluate(&series, s);
         for (j, value) in total.iter_mut().zip(integrands(policy, running, rows, &at, dim)) {
@@ -43,7 +43,8 @@ pub(super) fn weighted(weights: &[f64], z: &[f64], dim: usize) -> f64 {
 /// Twice the integrand of each objective at the state `z`; `rows` are the feedback rows of all players.
 fn integrands(policy: &Policy, running: &[Vec<f64>], rows: &[f64], z: &[f64], dim: usize) -> Vec<f64> {
     let game = policy.game();
-    let (n, size, w) = (game.n(), game.size(), game.weights());
+    let (n, w) = (game.n(), game.weights());
+    let size = z.len() / dim;
     let mut u = vec![0.0; dim];
     let effort: Vec<f64> = rows
         .chunks_exact(size)

@@ -2,6 +2,15 @@
 //!
 //! ż_i = u_i − u_a for each row i (B_d, B_τ and B_a written out), with u_i = g_i z for the constrained players, and
 //! u_a = h_a z, u_a = −r_a⁻¹B_aᵀP_a z = r_a⁻¹(1ᵀP_a) z. In I1 the target's own row is −r_τ⁻¹P_τ[N, :].
+//!
+//! Gains A + iB that turn couple the two axes of the plane: u = Az + BJz, J a quarter turn of every row. Beside z stands
+//! Jz then, and all rows have 2N entries, [a_i b_i]: with C = A + iB, J(Jz) = −z makes
+//!
+//! $$\frac{\mathrm{d}}{\mathrm{d}t}\begin{pmatrix} z \\ Jz \end{pmatrix} =
+//!   \begin{pmatrix} A & B \\ -B & A \end{pmatrix} \begin{pmatrix} z \\ Jz \end{pmatrix},$$
+//!
+//! a loop that acts on both axes alike, as one of scalar gains does. For the mirror image A − iB of the gains −Jz stands
+//! there.
 
 use crate::game::{Game, Interaction};
 
@@ -12,6 +21,23 @@ pub struct FreeRows {
     pub attacker: Vec<f64>,
     /// u_τ = row · z in I1; `None` in I2, where the target is constrained.
     pub target: Option<Vec<f64>>,
+}
+
+impl FreeRows {
+    /// The same on z and Jz.
+    #[must_use]
+    pub fn beside_turned(mut self) -> Self {
+        let width = 2 * self.attacker.len();
+        self.attacker.resize(width, 0.0);
+        self.target.iter_mut().for_each(|row| row.resize(width, 0.0));
+        self
+    }
+}
+
+/// The rows [a_i b_i] on z and Jz, m × 2N, of gains A + iB, m × N each.
+#[must_use]
+pub fn beside_turned(rows: &[f64], turn: &[f64], n: usize) -> Vec<f64> {
+    rows.chunks_exact(n).zip(turn.chunks_exact(n)).flat_map(|(a, b)| a.iter().chain(b)).copied().collect()
 }
 
 /// The rows of the unconstrained players at an instant with Riccati matrices `p` (all groups, one after another).
@@ -35,16 +61,24 @@ pub fn norm(c: &[f64], size: usize) -> f64 {
     c.chunks_exact(size).map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0, f64::max)
 }
 
-/// Writes C (N × N, row-major) for the gain rows `gains` (m × N).
+/// Writes C (N × N, row-major) for the gain rows `gains` (m × N); where all rows are on z and Jz, the 2N × 2N matrix of both.
 pub fn matrix(free: &FreeRows, gains: &[f64], c: &mut [f64]) {
-    let n = free.attacker.len();
+    let width = free.attacker.len();
     c[..gains.len()].copy_from_slice(gains);
+    let mut known = gains.len();
     if let Some(target) = &free.target {
-        c[gains.len()..].copy_from_slice(target);
+        known += width;
+        c[gains.len()..known].copy_from_slice(target);
     }
-    for row in c.chunks_exact_mut(n) {
+    let (c, turned) = c.split_at_mut(known);
+    for row in c.chunks_exact_mut(width) {
         for (x, a) in row.iter_mut().zip(&free.attacker) {
             *x -= a;
         }
+    }
+    for (row, out) in c.chunks_exact(width).zip(turned.chunks_exact_mut(width)) {
+        let (a, b) = row.split_at(width / 2);
+        out[width / 2..].copy_from_slice(a);
+        out.iter_mut().zip(b).for_each(|(x, b)| *x = -b);
     }
 }

@@ -20,12 +20,14 @@ mod saved;
 mod symmetry;
 mod table;
 pub(crate) mod transitions;
+mod turning;
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 pub use table::{DEFAULT_TABLE_BYTES, TableStats};
 pub(crate) use tadcore_kernels::policy::step_table;
+pub use turning::GainKind;
 
 use crate::cancel::CancelToken;
 use crate::error::{EquilibriumError, Stopped, TableError};
@@ -47,15 +49,15 @@ pub struct StepPolicy {
     pub gains: Gains,
     /// The squared residual norms of Θ, unweighted, in the order of γ.
     pub terms: Vec<f64>,
-    /// exp(Cδ), N × N row-major.
+    /// exp(Cδ), N × N row-major; where gains turn, N × 2N: the rows for z of the matrix on z and Jz.
     pub transition: Vec<f64>,
-    /// The attacker's displacement over the step is this row times z.
+    /// The attacker's displacement over the step is this row times z, or times z and Jz.
     pub attacker: Vec<f64>,
 }
 
 impl StepPolicy {
     fn bytes(&self) -> usize {
-        let numbers = [&self.gains.rows, &self.terms, &self.transition, &self.attacker];
+        let numbers = [&self.gains.rows, &self.gains.turn, &self.terms, &self.transition, &self.attacker];
         size_of::<Self>() + numbers.iter().map(|list| size_of_val(list.as_slice())).sum::<usize>()
     }
 }
@@ -69,6 +71,8 @@ pub struct Policy {
     budget: Budget,
     anchors: Anchors,
     table: Table,
+    /// The answers in gains that turn, where any were asked for.
+    turning: OnceLock<Table>,
     transitions: Transitions,
 }
 
@@ -104,7 +108,10 @@ impl Policy {
     /// the tables can be used, or one of its parent's threads holds what nobody will ever give back.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.anchors.is_idle() && self.table.is_idle() && self.transitions.is_idle()
+        self.anchors.is_idle()
+            && self.table.is_idle()
+            && self.turning.get().is_none_or(Table::is_idle)
+            && self.transitions.is_idle()
     }
 
     fn with(
@@ -120,7 +127,7 @@ impl Policy {
         let (table, budget) = (Table::new(instants, cancel)?, Budget::new(table_bytes));
         let transitions = Transitions::new(steps, game.constrained(), game.size(), kept, cancel)?;
         let (classes, anchors) = (SymmetryClasses::of(&game), Anchors::of(&equilibrium, cancel)?);
-        Ok(Self { game, equilibrium, classes, budget, anchors, table, transitions })
+        Ok(Self { game, equilibrium, classes, budget, anchors, table, turning: OnceLock::new(), transitions })
     }
 
     /// The game.
@@ -141,7 +148,7 @@ impl Policy {
         let transitions = &self.transitions;
         let load = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         TableStats {
-            entries: self.table.entries() + transitions.entries(),
+            entries: self.table.entries() + self.turning.get().map_or(0, Table::entries) + transitions.entries(),
             hits: load(&self.table.hits) + load(&transitions.hits),
             misses: load(&self.table.misses) + load(&transitions.misses),
             bytes: self.budget.used(),

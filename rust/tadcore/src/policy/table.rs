@@ -55,6 +55,11 @@ impl Table {
         })
     }
 
+    /// Of how many instants there are answers.
+    pub(super) fn instants(&self) -> usize {
+        self.instants.len()
+    }
+
     fn instant(&self, step: usize) -> &StepAnswers {
         &self.instants[if self.instants.len() == 1 { 0 } else { step }]
     }

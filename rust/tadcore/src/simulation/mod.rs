@@ -30,6 +30,6 @@ pub use outcome::{Outcome, Reach};
 pub use passes::{Pass, Termination};
 pub use record::{Divergence, Record, Rules, simulate, simulate_with};
 pub use setup::Setup;
-pub(crate) use state::apply;
 pub use state::relative_state;
+pub(crate) use state::{acted_on, apply};
 pub use world::{Chances, Communication, Conditions, World};

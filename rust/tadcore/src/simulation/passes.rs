@@ -10,7 +10,7 @@ use crate::cancel::CancelToken;
 use crate::error::RunError;
 use crate::game::validation::BEYOND;
 use crate::memory::{reserve, zeros};
-use crate::policy::{Policy, closed_loop};
+use crate::policy::{Policy, closed_loop, closed_loop::FreeRows};
 
 /// What asks for memory here.
 const WHAT: &str = "the passes of one run";
@@ -52,7 +52,7 @@ impl Pass {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Step<'a> {
     pub(crate) k: usize,
-    /// Gain rows in force.
+    /// Gain rows in force: on z, or on z and Jz where they turn, as are then the two states.
     pub(crate) gains: &'a [f64],
     pub(crate) start: &'a [f64],
     pub(crate) end: &'a [f64],
@@ -72,17 +72,17 @@ impl Step<'_> {
         cancel: &CancelToken,
         see: impl FnOnce(&mut Motion, &[(usize, f64)]) -> Result<(), RunError>,
     ) -> Result<(), RunError> {
-        let (game, size) = (policy.game(), policy.game().size());
-        let step = game.grid().step();
+        let (game, free) = (policy.game(), self.free_rows(policy));
+        let (step, size) = (game.grid().step(), free.attacker.len());
         let mut c = zeros(WHAT, size * size)?;
-        closed_loop::matrix(&policy.free_rows(self.k), self.gains, &mut c);
+        closed_loop::matrix(&free, self.gains, &mut c);
         let stretch = clear(closed_loop::norm(&c, size) * step);
         if !self.may_enter(reach, stretch) || !self.end.iter().all(|x| x.abs() <= BEYOND) {
             return Ok(());
         }
         let mut motion = Motion::new(&c, size, self.dim, step, cancel)?;
         let mut found: Vec<(usize, f64)> = Vec::new();
-        for i in 0..size {
+        for i in 0..game.size() {
             if let Some(after) = motion.enters(i, reach.squared(i), self.start, self.end)? {
                 found.push((i, after));
             }
@@ -90,6 +90,13 @@ impl Step<'_> {
         found.sort_by(|a, b| a.1.total_cmp(&b.1));
         see(&mut motion, &found)?;
         if motion.lost() { Err(RunError::Turns { time: game.grid().time(self.k) }) } else { Ok(()) }
+    }
+
+    /// The rows of the players that see everything, on z or on z and Jz as the gains are.
+    fn free_rows(&self, policy: &Policy) -> FreeRows {
+        let free = policy.free_rows(self.k);
+        let scalar = self.gains.len() == policy.game().constrained() * policy.game().size();
+        if scalar { free } else { free.beside_turned() }
     }
 
     /// Whether some chord comes near enough to its radius for the motion to enter it; `stretch` is [`clear`]'s.
@@ -107,7 +114,8 @@ impl Step<'_> {
         passes: &mut Vec<Pass>,
         cancel: &CancelToken,
     ) -> Result<(), RunError> {
-        let ending = reach.ends(self.end, self.dim).map(|outcome| reach.row(outcome));
+        let ending =
+            reach.ends(&self.end[..policy.game().size() * self.dim], self.dim).map(|outcome| reach.row(outcome));
         self.entries(policy, reach, cancel, |motion, found| {
             for &(row, enters) in found.iter().take_while(|entry| Some(entry.0) != ending) {
                 let (closest, distance) = motion.closest(row, self.start, self.end)?;
@@ -131,7 +139,7 @@ impl Step<'_> {
         let mut end = None;
         self.entries(policy, reach, cancel, |motion, found| {
             if let Some(&(row, after)) = found.first().filter(|first| first.1 < step) {
-                let (z, moved) = motion.at(after, &policy.free_rows(self.k).attacker, self.start)?;
+                let (z, moved) = motion.at(after, &self.free_rows(policy).attacker, self.start)?;
                 end = Some((row, after, z, moved));
             }
             Ok(())

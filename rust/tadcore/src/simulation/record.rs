@@ -5,15 +5,15 @@ use super::divergence;
 use super::outcome::{Outcome, Reach};
 use super::passes::{Pass, Step, Termination};
 use super::setup::Setup;
-use super::state::{apply, relative_state};
+use super::state::{acted_on, apply, relative_state};
 use super::world::Chances;
 use crate::cancel::CancelToken;
 use crate::error::{RunError, Stopped};
 use crate::game::Grid;
-use crate::game::validation::BEYOND;
+use crate::game::validation::{BEYOND, rule};
 use crate::memory::{MOST_BYTES, append, reserve, spare, within};
 use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
-use crate::policy::{Policy, StepPolicy, closed_loop::FreeRows};
+use crate::policy::{GainKind, Policy, StepPolicy, closed_loop::FreeRows};
 use crate::synthesis::{Status, Synthesizer};
 
 /// When a run diverged, and how far.
@@ -56,8 +56,12 @@ pub struct Record {
     pub controls: Vec<f64>,
     /// The network at each row.
     pub networks: Vec<Topology>,
+    /// What the gains are made of.
+    pub kind: GainKind,
     /// Gain rows, (L + 1) × m × N.
     pub gains: Vec<f64>,
+    /// Their imaginary parts, (L + 1) × m × N; empty for scalar gains.
+    pub turn: Vec<f64>,
     /// Θ at each row, reduced.
     pub theta: Vec<f64>,
     /// Terms of Θ, unweighted and reduced, (L + 1) × 4 or 3.
@@ -79,6 +83,8 @@ pub struct Rules<'a> {
     pub edges: EdgeRule,
     /// When the game ends.
     pub termination: Termination,
+    /// What the gains are made of.
+    pub gains: GainKind,
     /// A world, and which of its trials.
     pub chances: Option<Chances<'a>>,
     /// A network from outside, in the place of what is seen.
@@ -106,6 +112,9 @@ pub fn simulate_with(
     cancel: &CancelToken,
 ) -> Result<Record, RunError> {
     setup.check(policy.game())?;
+    let kind = rules.gains;
+    let words = "2: gains turn in the plane alone";
+    rule("dim", setup.dim as f64, kind == GainKind::Scalar || setup.dim == 2, words)?;
     rules.edges.check()?;
     if let (Some(chances), Termination::Continuous) = (&rules.chances, rules.termination) {
         chances.world.refuse_between()?;
@@ -136,7 +145,9 @@ pub fn simulate_with(
         positions: Vec::new(),
         controls: Vec::new(),
         networks: Vec::new(),
+        kind,
         gains: Vec::new(),
+        turn: Vec::new(),
         theta: Vec::new(),
         terms: Vec::new(),
         iterations: 0,
@@ -177,7 +188,7 @@ pub fn simulate_with(
                 topology = given.ok_or(RunError::Network { time })?;
             }
         }
-        let step = policy.at(k, &topology, &mut solver, cancel)?;
+        let step = policy.answer(kind, k, &topology, &mut solver, cancel)?;
         if recording {
             record.push(policy, k, &z, &attacker, &topology, &step)?;
             if let Some(course) = &mut record.course {
@@ -198,14 +209,19 @@ pub fn simulate_with(
             break;
         }
         let before = (rules.termination == Termination::Continuous).then(|| attacker.clone());
-        advance(&step, &z, dim, &mut next, &mut attacker);
-        let within = Step { k, gains: &step.gains.rows, start: &z, end: &next, dim };
+        // Scalar rows act on the first of it, z alone.
+        let from = acted_on(&z, kind);
+        advance(&step, &from, dim, &mut next, &mut attacker);
+        let (gains, to) = (step.feedback(size), acted_on(&next, kind));
+        let width = dim * gains.len() / m;
+        let within = Step { k, gains: &gains, start: &from[..width], end: &to[..width], dim };
         match before {
             None if record.diverged.is_some() => {} // a pass says nothing any more
             None if present.as_ref().is_some_and(Present::shakes) => {}
             None => within.passes(policy, &reach, &mut record.passes, cancel)?,
             Some(from) => {
-                if let Some((row, after, z, moved)) = within.end(policy, &reach, cancel)? {
+                if let Some((row, after, mut z, moved)) = within.end(policy, &reach, cancel)? {
+                    z.truncate(size * dim);
                     let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
                     if recording {
                         record.push(policy, k, &z, &attacker, &topology, &step)?;
@@ -284,6 +300,7 @@ impl Record {
             all.truncate(all.len() - width);
         }
         self.gains.truncate(self.gains.len() - gains);
+        self.turn.truncate(self.gains.len());
         self.networks.pop();
         self.theta.pop();
         if let Some(course) = &mut self.course {
@@ -295,7 +312,8 @@ impl Record {
     fn bytes(&self, policy: &Policy, rows: usize, dim: usize) -> u128 {
         let game = policy.game();
         let (n, m) = (game.size() as u128, game.constrained() as u128);
-        let numbers = 2 * (n + 1) * dim as u128 + m * n + 5;
+        let gains = if self.kind == GainKind::Scalar { m * n } else { 2 * m * n };
+        let numbers = 2 * (n + 1) * dim as u128 + gains + 5;
         let course = if self.course.is_some() { Course::bytes(game, dim) } else { 0 };
         rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128 + course)
     }
@@ -324,14 +342,21 @@ impl Record {
         self.positions.extend(positions(z, attacker, dim));
         let FreeRows { attacker: h, target } = policy.free_rows(k);
         let mut velocity = vec![0.0; dim];
-        let gains = step.gains.rows.chunks_exact(network.size());
+        let (state, feedback) = (acted_on(z, self.kind), step.feedback(network.size()));
+        let gains = feedback.chunks_exact(feedback.len() / network.rows());
         for row in gains.chain(target.as_deref()).chain(std::iter::once(&h[..])) {
-            apply(row, z, dim, &mut velocity);
+            apply(row, &state, dim, &mut velocity);
             self.controls.extend_from_slice(&velocity);
         }
         self.terms.extend_from_slice(&step.terms);
         self.networks.push(network.clone());
         append(WHAT, &mut self.gains, &step.gains.rows)?;
+        if self.kind != GainKind::Scalar {
+            let mirror = self.kind == GainKind::Mirror;
+            reserve(WHAT, &mut self.turn, step.gains.rows.len())?;
+            self.turn.extend(step.gains.turn.iter().map(|&b| if mirror { 0.0 - b } else { b }));
+            self.turn.resize(self.gains.len(), 0.0);
+        }
         self.theta.push(step.gains.theta);
         Ok(())
     }

@@ -1,10 +1,26 @@
 //! The state z as rows: made from positions, and multiplied by a row of gains or of a transition.
 
+use std::borrow::Cow;
+
+use crate::policy::GainKind;
+
 /// z from positions ordered d₁…d_n, target, attacker: every row less the attacker's.
 pub fn relative_state(positions: &[f64], dim: usize, z: &mut Vec<f64>) {
     let (players, attacker) = positions.split_at(positions.len() - dim);
     z.clear();
     z.extend(players.chunks_exact(dim).flat_map(|row| row.iter().zip(attacker).map(|(x, a)| x - a)));
+}
+
+/// What the rows of gains of some kind act on: z, beside it Jz for gains that turn, −Jz for their mirror images; J is a
+/// quarter turn in the plane.
+pub(crate) fn acted_on(z: &[f64], kind: GainKind) -> Cow<'_, [f64]> {
+    let sign = match kind {
+        GainKind::Scalar => return z.into(),
+        GainKind::Turning => 1.0,
+        GainKind::Mirror => -1.0,
+    };
+    let turned = z.chunks_exact(2).flat_map(|row| [-sign * row[1], sign * row[0]]);
+    z.iter().copied().chain(turned).collect()
 }
 
 /// out = row · z.

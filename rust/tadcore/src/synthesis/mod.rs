@@ -89,6 +89,9 @@ const TOLERANCE: (f64, f64) = (1e-12, 1e-10);
 pub struct Gains {
     /// g_i, m × N; zero on players that i does not see.
     pub rows: Vec<f64>,
+    /// The imaginary parts of gains that turn, m × N: u_i = g_i z + h_i Jz with these rows h_i and J a quarter turn of the
+    /// plane. Empty for scalar gains.
+    pub turn: Vec<f64>,
     /// Θ, reduced.
     pub theta: f64,
     /// Norm of the gradient with respect to the variables, relative to the parts that cancel in it. Where these parts
@@ -113,13 +116,13 @@ impl Gains {
     /// The paper's K_i, reduced (m × N): entry j ≠ i on z_j − z_i, entry i on z_i; zero on players not seen.
     #[must_use]
     pub fn paper_gains(&self, topology: &Topology) -> Vec<f64> {
-        let n = topology.size();
-        let mut k = self.rows.clone();
-        for i in 0..topology.rows() {
-            let row = &self.rows[i * n..(i + 1) * n];
-            k[i * n + i] = if topology.sees_attacker(i) { row.iter().sum() } else { 0.0 };
-        }
-        k
+        blocks_of(&self.rows, topology)
+    }
+
+    /// The imaginary parts of these, where gains turn.
+    #[must_use]
+    pub fn paper_turn(&self, topology: &Topology) -> Vec<f64> {
+        if self.turn.is_empty() { Vec::new() } else { blocks_of(&self.turn, topology) }
     }
 
     /// Whether the minimum is proved to be global among the paper's gains, blocks of dim × dim, those that turn included.
@@ -211,6 +214,44 @@ impl Synthesizer {
         Ok(())
     }
 
+    /// The gains of lowest Θ among those that turn, from the lowest among scalar ones: these themselves where it is proved
+    /// that no blocks are lower, or none are found.
+    ///
+    /// # Errors
+    /// As for [`Self::solve`].
+    pub fn turn(&mut self, problem: &Problem, topology: &Topology, scalars: &Gains) -> Result<Gains, Stopped> {
+        if scalars.certified_blocks(problem, topology, self.dispatcher.cancel())? {
+            return Ok(scalars.clone());
+        }
+        let mut candidates = candidates(problem, std::slice::from_ref(topology))?;
+        let candidate = &mut candidates[0];
+        if candidate.variables.is_empty() {
+            return Ok(scalars.clone());
+        }
+        candidate.g.copy_from_slice(&scalars.rows);
+        let Self { dispatcher, tasks, doubled, workspace } = self;
+        let limits = limits(Options::default());
+        let mut search = Search { problem, limits, dispatcher, tasks, doubled, workspace };
+        let found = search.turn(candidate)?;
+        let iterations = scalars.iterations + candidate.iterations;
+        let Some((point, reached)) = found else {
+            return Ok(Gains { iterations, ..scalars.clone() });
+        };
+        let (rows, turn) = point.split_at(problem.rows * problem.size);
+        Ok(Gains {
+            rows: rows.to_vec(),
+            turn: turn.to_vec(),
+            theta: problem.in_scale_of_gamma(reached.value),
+            gradient_norm: reached.gradient_norm,
+            iterations,
+            status: reached.status,
+            certified: false,
+            start: Start::Complex,
+            left_out: scalars.left_out,
+            narrow: scalars.narrow,
+        })
+    }
+
     /// The gains for each of `topologies` that Newton's method reaches from `starts`, handed to `each` with the
     /// topology's index; none where it does not soon reach a minimum near there, which then has to be searched for.
     ///
@@ -233,6 +274,17 @@ impl Synthesizer {
         }
         Ok(())
     }
+}
+
+/// K_i of gain rows.
+fn blocks_of(rows: &[f64], topology: &Topology) -> Vec<f64> {
+    let n = topology.size();
+    let mut k = rows.to_vec();
+    for i in 0..topology.rows() {
+        let row = &rows[i * n..(i + 1) * n];
+        k[i * n + i] = if topology.sees_attacker(i) { row.iter().sum() } else { 0.0 };
+    }
+    k
 }
 
 fn limits(options: Options) -> Limits {
@@ -270,6 +322,7 @@ fn gains(problem: &Problem, candidate: Candidate) -> Gains {
         left_out: candidate.left_out,
         narrow: !candidate.quick && !candidate.complete,
         rows: candidate.g,
+        turn: Vec::new(),
     }
 }
 

@@ -42,6 +42,7 @@
 //! | `refine` | the end of the search where players differ by decades |
 //! | `fits` | starts that fit GᵀRG to M player by player |
 //! | `heavier` | a second search where γ₁ dominates |
+//! | `turning` | the search in gains that turn |
 //! | `settle` | the search where S has next to no weight, and which of equal minima is taken where it has none |
 
 mod blocks;
@@ -56,6 +57,7 @@ mod refine;
 mod settle;
 mod stages;
 mod start;
+mod turning;
 
 pub(crate) use blocks::covers_blocks;
 pub use candidate::Start;

@@ -8,10 +8,12 @@
 //! | `problem` | the same from a game and its Riccati matrices |
 //! | `real` | Θ over the gains, and the certificate of a global minimum |
 //! | `doubled` | Θ over twice as many gains, complex or stacked |
+//! | `terms` | its terms one by one |
 //! | `tabled` | Θ over the gains of one network of a large game |
 
 mod problem;
 mod tabled;
+mod terms;
 
 pub use problem::Problem;
 pub(crate) use tabled::{Scratch, Tabled, TabledCertificate, TabledParts};

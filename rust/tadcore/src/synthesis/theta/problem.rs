@@ -253,32 +253,6 @@ impl Problem {
         &self.theta.double.fne
     }
 
-    /// The squared residual norms of the gain rows `g`, unweighted and reduced, in the order of γ:
-    /// ‖ΔQ_d‖², ‖ΔQ_τ‖², ‖ΔQ_a‖², ‖S₁‖² in I1 (`p`: the Riccati matrices of the instant) and ‖ΔQ‖², ‖S₂‖², ‖S₃‖² in I2.
-    ///
-    /// # Errors
-    /// [`Stopped`] when there is no memory, or `cancel` was raised.
-    pub fn terms(&self, p: &[f64], g: &[f64], cancel: &CancelToken) -> Result<Vec<f64>, Stopped> {
-        let (n, m, of) = (self.size, self.rows, &self.theta.double);
-        let mut delta = copy(WHAT, g)?;
-        delta.iter_mut().zip(&of.fne).for_each(|(d, f)| *d -= f);
-        let closeness = |rows: std::ops::Range<usize>| -> f64 {
-            rows.flat_map(|i| delta[i * n..(i + 1) * n].iter().map(move |d| (of.r[i] * d).powi(2))).sum()
-        };
-        let mut product = zeros(WHAT, n * n)?;
-        multiply(n, Some(&of.r), g, g, &mut product, cancel)?;
-        let quadratic = product.iter().zip(&of.target).map(|(gain, m)| (gain - m).powi(2)).sum();
-        if self.interaction == Interaction::I2 {
-            return Ok(vec![quadratic, closeness(0..m - 1), closeness(m - 1..m)]);
-        }
-        let mut coupled = |group: usize| -> Result<f64, Stopped> {
-            multiply(n, None, &p[group * n * n..][..m * n], &delta, &mut product, cancel)?;
-            let pair = |e: usize| product[e] + product[e % n * n + e / n];
-            Ok((0..n * n).map(|e| pair(e).powi(2)).sum())
-        };
-        Ok(vec![quadratic, coupled(1)?, coupled(2)?, closeness(0..m)])
-    }
-
     /// Θ = γ · terms.
     #[must_use]
     pub fn weigh(&self, terms: &[f64]) -> f64 {
@@ -286,28 +260,8 @@ impl Problem {
     }
 }
 
-/// out = Σ_i r_i left_iᵀ right_i, rows of N each; without r where there is none.
-fn multiply(
-    n: usize,
-    r: Option<&[f64]>,
-    left: &[f64],
-    right: &[f64],
-    out: &mut [f64],
-    cancel: &CancelToken,
-) -> Result<(), Stopped> {
-    out.fill(0.0);
-    for (i, (left, right)) in left.chunks_exact(n).zip(right.chunks_exact(n)).enumerate() {
-        cancel.check()?;
-        for (row, &l) in out.chunks_exact_mut(n).zip(left) {
-            let l = r.map_or(l, |r| r[i] * l);
-            row.iter_mut().zip(right).for_each(|(x, r)| *x += l * r);
-        }
-    }
-    Ok(())
-}
-
 /// What asks for memory here.
-const WHAT: &str = "the synthesis problem of one instant";
+pub(super) const WHAT: &str = "the synthesis problem of one instant";
 
 /// e of the power of two with 2^e ≤ x < 2^(e + 1); 0 for x = 0.
 fn exponent(x: f64) -> i32 {
