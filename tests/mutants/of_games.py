@@ -27,6 +27,7 @@ MUTANTS = {
         ("u_a by P_a", "Interaction::I1 => «&p[2 * n * n..3 * n * n]»", "&p[n * n..2 * n * n]"),
         ("u_τ", "«-x / w.r_tau»", "x / w.r_tau"),
         ("C = u_i − u_a", "«*x -= a;»", "*x += a;"),
+        ("−B beside A", "«*x = -b»", "*x = *b"),
     ],
     "policy/exponential.rs": [
         ("expm", "«term * x / k as f64»", "term * x / -(k as f64)"),
@@ -117,7 +118,8 @@ MUTANTS = {
         ("crossings in the order of time", "«a.1.total_cmp(&b.1)»", "b.1.total_cmp(&a.1)"),
     ],
     "cost/moments.rs": [
-        ("moments: C", "DoubleDouble::difference(own[ij], «attacker[ij % n]»)", "-attacker[ij % n]"),
+        ("moments: C", "«sign * attacker[other]»", "-sign * attacker[other]"),
+        ("moments: −B", "(false, true) => (i - players, j + players, «-1.0»)", "1.0"),
         ("moments: pieces", "for _ in «0..1_u64 << (halvings - doublings)»", "1..1_u64 << (halvings - doublings)"),
         ("moments: series of z", "let factor = «h.over(j as f64)»;\n            let last", "h.over(-(j as f64))"),
         ("moments: partner of a term", "&fractions[«j..j + count»]", "j + 1..j + count + 1"),

@@ -288,7 +288,7 @@ def test_a_map_that_cannot_be_made_names_the_option(tadcore, tmp_path, given, sa
     assert said in err
 
 
-@pytest.mark.parametrize("given", ["--seed=-1", "--trial=-1", "--termination=late"])
+@pytest.mark.parametrize("given", ["--seed=-1", "--trial=-1", "--termination=late", "--gains=complex", "--mirror"])
 def test_a_run_that_cannot_be_made_names_the_option(tadcore, given):
     code, _, err = tadcore("simulate", "paper-i1", given)
     assert code == 2

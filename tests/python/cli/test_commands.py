@@ -52,6 +52,15 @@ def test_json_is_all_that_stands_on_standard_output(run):
     assert (code, err, json.loads(out)["status"]) == (0, "", "passed")
 
 
+def test_a_game_is_played_with_gains_that_turn_and_compared_with_them(run):
+    code, out, _ = run("simulate", "paper-i1", "--gains", "turning", "--mirror", "--out", "run", "--json")
+    assert (code, json.loads(out)["variant"]) == (0, "mirrored turning gains")
+    assert tadcore.load_run("run").mirror
+    code, out, _ = run("verify", "paper-i1", "--deviations", 0, "--turning", "--json")
+    measured = {m["name"]: m["value"] for m in json.loads(out)["measurements"]}
+    assert (code, measured["turning.covered"], measured["turning.gap"]) == (0, 1.0, 0.0)
+
+
 def test_quiet_prints_errors_only(run):
     for command in (
         ("simulate", "paper-i1"),

@@ -264,6 +264,22 @@ mod tests {
         }
     }
 
+    /// A spiral, ż = (λ + iω)(z − z_a) with an attacker that stays: |z|² grows by e^{2λs}, and z is at right angles to Jz.
+    #[test]
+    fn a_loop_that_turns_is_integrated_beside_jz() {
+        let cancel = CancelToken::new();
+        let (rate, turn) = (0.3_f64, 40.0);
+        let motion = Motion::new(&[rate, turn, 0.0, 0.0], 1, 2, &cancel).expect("memory");
+        // z = (3, 4), axis by axis with Jz = (−4, 3).
+        let mut from = Numbers::zeros(4).expect("memory");
+        [3.0, -4.0, 4.0, 3.0].into_iter().enumerate().for_each(|(i, x)| from.set(i, DoubleDouble::exact(x)));
+        let s = motion.over_step(&mut from, DoubleDouble::exact(1.0)).expect("memory");
+        let wanted = 25.0 * (2.0 * rate).exp_m1() / (2.0 * rate);
+        for (ij, wanted) in [wanted, 0.0, 0.0, wanted].into_iter().enumerate() {
+            assert!((s.at(ij).hi - wanted).abs() <= 1e-14 * 25.0, "{ij}: {:e}, {wanted:e}", s.at(ij).hi);
+        }
+    }
+
     /// Beside a mode that grows by e¹⁵ and is not in z, what decays is integrated to rounding.
     #[test]
     fn what_decays_beside_a_mode_that_grows_is_integrated_exactly() {

@@ -82,3 +82,18 @@ pub fn matrix(free: &FreeRows, gains: &[f64], c: &mut [f64]) {
         out.iter_mut().zip(b).for_each(|(x, b)| *x = -b);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beside_jz_a_complex_loop_is_a_real_one() {
+        let free = FreeRows { attacker: vec![0.5, -1.0], target: Some(vec![2.0, 3.0]) }.beside_turned();
+        let rows = beside_turned(&[1.0, 4.0], &[7.0, -2.0], 2);
+        assert_eq!(rows, [1.0, 4.0, 7.0, -2.0]);
+        let mut c = [0.0; 16];
+        matrix(&free, &rows, &mut c);
+        assert_eq!(c, [0.5, 5.0, 7.0, -2.0, 1.5, 4.0, 0.0, 0.0, -7.0, 2.0, 0.5, 5.0, 0.0, 0.0, 1.5, 4.0]);
+    }
+}
