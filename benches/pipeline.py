@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 import tadcore
+import tadcore.study.keepers
 import tadcore.study.running
 from tadcore import _core
 from tadcore.sampling import Box
@@ -145,6 +146,7 @@ def head(trials: int, rounds: int) -> None:
 def workers(many: int, trials: int, rounds: int, folder: Path) -> None:
     """Processes that write their rows, and the same that send them: what this process does meanwhile."""
     study = tadcore.Study(tadcore.scenarios.load("paper-i1"), VARY, trials=trials, seed=7)
+    tadcore.study.keepers.EAGER = 0  # as of a longer study, whose rows do not come into memory at the end
     with futures.ProcessPoolExecutor(many, mp_context=multiprocessing.get_context("spawn")) as pool:
         study.run(executor=pool, keep="counts")  # fills the gain tables
         for keep in ("all", "outcomes"):

@@ -27,7 +27,7 @@ from .parts import Format, Join, Joined
 from .place import Place
 from .plan import Plan
 from .store import Store
-from .task import Played, Task
+from .task import Played, Task, Written
 from .warm_start import read_once
 
 
@@ -95,7 +95,7 @@ def run_task(given: Sent, task: Task | Join, threads: int) -> Played | Joined:
     plan = given.plan
     if isinstance(task, Join):
         assert given.store is not None  # which has the parts
-        return _format(plan, given.store).join(task)
+        return _format(plan, given.store).join(task, given.store.holds)
     if given.table is not None:
         read_once(plan.scenario, given.table)
     played = plan.run(task, threads)
@@ -111,14 +111,18 @@ def _written(plan: Plan, store: Reached, played: Played) -> Played:
     began = time.perf_counter()
     if not store.holds():
         return played
-    form, chunks, written = _format(plan, store), played.task.chunks(), []
+    form, chunks = _format(plan, store), played.task.chunks()
+    written: list[Written] = []
     start = 0
     try:
         while start < len(chunks):
             first = chunks[start][0]
             stop = min(start + store.group - first % store.group, len(chunks))
             rows = form.table(first * CHUNK, played.outcomes[start:stop])
-            written.append(form.put(first * CHUNK, rows))
+            one = form.put(first * CHUNK, rows, store.holds)
+            if one is None:
+                return played  # the run has ended, or was killed
+            written.append(one)
             start = stop
     except StoreError:
         return played  # whoever asked for it writes the rows, or learns what is the matter

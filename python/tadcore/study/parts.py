@@ -11,7 +11,7 @@ import base64
 import contextlib
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -107,8 +107,11 @@ class Format:
         """Outcomes of consecutive chunks as rows."""
         return table_of(first, chunks, self.plan, self.schema)
 
-    def put(self, first: int, table: pa.Table) -> Written:
-        """Write the rows from a trial on as a part, whose bytes are a function of them and of the study alone."""
+    def put(self, first: int, table: pa.Table, still: Callable[[], bool] = lambda: True) -> Written | None:
+        """Write the rows from a trial on as a part, whose bytes are a function of them and of the study alone.
+
+        None where ``still``, asked when all is ready to be written, says no.
+        """
         part, found = Part(first, first + len(table)), digests(table)
         said = {
             "study": self.study,
@@ -117,7 +120,10 @@ class Format:
             "sha256": " ".join(found),
             "tally": _packed(tally_of(table, self.plan)),
         }
-        self.place.write(part.name, encoded(table, {f"tadcore_{key}": value for key, value in said.items()}))
+        content = encoded(table, {f"tadcore_{key}": value for key, value in said.items()})
+        if not still():
+            return None
+        self.place.write(part.name, content)
         return Written(part.first, part.end, tuple(found))
 
     def confirm(self, written: Written) -> Part:
@@ -132,10 +138,11 @@ class Format:
             raise StoreError(self.place.at(part.name), "it does not hold what a worker has written", _AGAIN)
         return part
 
-    def join(self, task: Join) -> Joined:
+    def join(self, task: Join, still: Callable[[], bool]) -> Joined:
         """Write the rows of several parts as one."""
         rows = pa.concat_tables([self.read(part, held) for part, held in task.pieces])
-        return Joined(task, (self.put(task.first * CHUNK, rows),))
+        written = self.put(task.first * CHUNK, rows, still)
+        return Joined(task, () if written is None else (written,))
 
     def footer(self, part: Part, opened: pq.ParquetFile) -> dict[str, str]:
         """What a part says of itself; raises `StoreError` where that is not what its name says."""

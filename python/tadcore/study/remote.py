@@ -39,7 +39,7 @@ class Remote:
         Arguments of fsspec's file system, which then is used for every service.
     """
 
-    threads = 16
+    threads = 8
 
     def __init__(self, url: str, options: Mapping[str, Any] | None = None) -> None:
         self._url, self._options = urlsplit(url), None if options is None else dict(options)
@@ -69,15 +69,23 @@ class Remote:
     def open(self, field: str) -> Remote:
         """Itself, if its service is known and its options fit; else raises `ScenarioError`."""
         try:
-            files, path = self._files()
-            with contextlib.suppress(OSError):
-                files.get_file_info(path)  # some packages look at their options only now
+            self._try()
         except ImportError as error:
             rule = f"opened by what is installed ({error}): fsspec comes with pip install 'tadcore[cloud]'"
             raise ScenarioError(field, str(self), rule) from None
         except (ValueError, TypeError, OSError) as error:
             raise ScenarioError(field, str(self), f"a URL that Arrow or fsspec can open ({error})") from None
         return self
+
+    def _try(self) -> None:
+        """Open it, and ask something, since some packages see their options only then."""
+        files, path = self._files()
+        try:
+            files.get_file_info(path)
+        except (ImportError, ValueError, TypeError):
+            raise
+        except Exception:  # what the service refuses it refuses again, in the words of a store, when it is used
+            return
 
     def names(self) -> list[str]:
         """The objects, and what begins longer prefixes."""

@@ -42,7 +42,7 @@ class Writer:
         self._store, self._workers = store, workers
         self.joins: deque[Join] = deque()
         self._asked: set[int] = set()
-        self._most = _PENDING * (store.place.threads // 2)
+        self._most = _PENDING + store.place.threads - 2
         self._left = Counter(chunk // parts.GROUP for chunk in chunks)
         self._open: dict[int, dict[int, Outcomes]] = {}
         self._since: dict[int, float] = {}
@@ -79,8 +79,9 @@ class Writer:
 
     def joined(self, joined: Joined) -> None:
         """Take note of a part that a worker has joined, and remove what it was joined from."""
-        future = self._pool.submit(self._swap, joined)
-        self._joining.setdefault(joined.task.first // parts.GROUP, []).append(future)
+        group = joined.task.first // parts.GROUP
+        future = self._pool.submit(self._swap, joined, self._joining.pop(group, []))
+        self._joining[group] = [future]
         self._pending.append(future)
         self._settle()
 
@@ -97,6 +98,7 @@ class Writer:
             files = Counter(self._group(part) for part in self._files())  # joins that no worker was there to take
             for group in [group for group, many in files.items() if many > 1 and group in self._asked]:
                 self._put(group, {}, [], join=True)
+            self._sweep_late()
         finally:
             self._pool.shutdown(wait=True)
 
@@ -141,7 +143,9 @@ class Writer:
     def _find(self, written: Written) -> None:
         self._register(self._store.format.confirm(written))
 
-    def _swap(self, joined: Joined) -> None:
+    def _swap(self, joined: Joined, before: list[Future[None]]) -> None:
+        for future in before:
+            future.result()
         for one in joined.written:
             self._find(one)
             self._sweep(self._group(Part(one.first, one.end)))
@@ -178,6 +182,13 @@ class Writer:
             if self._group(part) == group and part not in in_use:
                 self._store.place.remove(part.name)
                 self._store.files.discard(part)
+
+    def _sweep_late(self) -> None:
+        """Remove what workers of a run that was killed have still written, where larger parts have its rows."""
+        store = self._store
+        for part in parts.parts_in(store.place) - store.files:
+            if all(store.rows(chunk) >= min(part.end - chunk * CHUNK, CHUNK) for chunk in part.chunks):
+                store.place.remove(part.name)
 
 
 def _runs(rows: dict[int, int]) -> Iterator[range]:

@@ -3,6 +3,7 @@
 import concurrent.futures as futures
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,12 +15,13 @@ from pathlib import Path
 import pytest
 
 import tadcore
-from study_cases import CHUNK, FLAG, calm_team, lethal, misses, parts, study
+from study_cases import CHUNK, FLAG, calm_team, lethal, misses, part, parts, study
 from tadcore import StoreError, WorkerError
 from tadcore.study import verify_store
 from tadcore.study.elsewhere import Reached
 from tadcore.study.keepers import RowKeeper
 from tadcore.study.parts import Format, Joined
+from tadcore.study.plan import Plan
 from tadcore.study.task import Written
 from tadcore.study.warm_start import read_once
 from tadcore.study.workers import Groups, Wanted
@@ -121,10 +123,10 @@ def test_a_rule_stops_a_study_whose_workers_write(tmp_path):
 def test_some_workers_write_and_others_send(tmp_path, monkeypatch, came):
     turns, put = iter(range(10**6)), Format.put
 
-    def sometimes(form, first, table):
+    def sometimes(form, first, table, *still):
         if "ThreadPoolExecutor" in threading.current_thread().name and next(turns) % 2:
             raise StoreError("there", "a disk of its own", "nothing")
-        return put(form, first, table)
+        return put(form, first, table, *still)
 
     study(TRIALS).run(store=tmp_path / "alone")
     monkeypatch.setattr(Format, "put", sometimes)
@@ -143,8 +145,8 @@ def test_some_workers_write_and_others_send(tmp_path, monkeypatch, came):
 @pytest.mark.parametrize(
     ("put", "words"),
     [
-        (lambda form, first, table: Written(first, first + len(table), ("0",)), "it is not there; let the workers"),
-        (lambda form, first, table: PUT(form, first, table)._replace(digests=("0",)), "not hold what a worker has"),
+        (lambda form, first, table, *_: Written(first, first + len(table), ("0",)), "it is not there; let the workers"),
+        (lambda form, first, table, *_: PUT(form, first, table)._replace(digests=("0",)), "not hold what a worker has"),
     ],
 )
 def test_what_a_worker_says_is_confirmed(put, words, tmp_path, monkeypatch):
@@ -252,6 +254,33 @@ def test_a_head_killed_while_its_workers_write_is_resumed(tmp_path):
     whole = study(60 * CHUNK).run(store=tmp_path / "whole")
     assert result.table.equals(whole.table)
     assert parts(folder) == parts(tmp_path / "whole")
+
+
+def test_what_a_worker_of_a_killed_run_writes_late_does_not_stay(tmp_path, monkeypatch):
+    """It appears while the next run is on its way, as a smaller part than that run writes."""
+    study(TRIALS).run(store=tmp_path / "alone")
+    with monkeypatch.context() as patch:
+        patch.setattr("tadcore.study.parts.GROUP", 1)
+        study(2 * CHUNK).run(store=tmp_path / "small")
+    late, play = (tmp_path / "small" / part(1)), Plan.run
+
+    def run(plan, *given):
+        shutil.copy(late, tmp_path / "store")
+        return play(plan, *given)
+
+    monkeypatch.setattr(Plan, "run", run)
+    result = study(TRIALS).run(store=tmp_path / "store")
+    assert parts(tmp_path / "store") == parts(tmp_path / "alone")
+    assert result.table.equals(tadcore.load_study(tmp_path / "alone").table)
+
+
+def test_a_worker_whose_run_has_ended_writes_nothing(tmp_path, monkeypatch, came):
+    """The sign goes between the playing and the writing."""
+    asked = iter([True] + 9 * [False])
+    monkeypatch.setattr(Reached, "holds", lambda _: next(asked))
+    with futures.ThreadPoolExecutor(1) as pool:
+        study(CHUNK).run(store=tmp_path, executor=pool)
+    assert [bool(played.written) for played in came] == [False]
 
 
 @pytest.mark.filterwarnings("ignore")  # what Dask warns of while it starts and stops is its own affair
