@@ -147,7 +147,8 @@ def _lines(run: Any, most: int = 20) -> list[str]:
     lost = [] if run.diverged is None else [f"the game {run.diverged}"]
     drawn = [f"seed {run.seed}, trial {run.trial}"] if run.scenario.is_random else []
     around = [*worlds.describe(run.scenario)[: -1 if drawn else None], *drawn]
-    lines = [str(run.outcome), *lost, *passes, *around, "network:"]
+    turning = [run.variant] if run.turning else []
+    lines = [str(run.outcome), *turning, *lost, *passes, *around, "network:"]
     for change in changes[:most]:
         edges = [f"+{p}→{q}" for p, q in change.added] + [f"-{p}→{q}" for p, q in change.removed]
         lines.append(f"  t = {change.time:<8.10g} {'  '.join(edges) or 'no edges'}")

@@ -56,6 +56,7 @@ def test_a_game_is_played_with_gains_that_turn_and_compared_with_them(run):
     code, out, _ = run("simulate", "paper-i1", "--gains", "turning", "--mirror", "--out", "run", "--json")
     assert (code, json.loads(out)["variant"]) == (0, "mirrored turning gains")
     assert tadcore.load_run("run").mirror
+    assert "mirrored turning gains\n" in "".join(run("simulate", "paper-i1", "--gains", "turning", "--mirror")[1:])
     code, out, _ = run("verify", "paper-i1", "--deviations", 0, "--turning", "--json")
     measured = {m["name"]: m["value"] for m in json.loads(out)["measurements"]}
     assert (code, measured["turning.covered"], measured["turning.gap"]) == (0, 1.0, 0.0)
