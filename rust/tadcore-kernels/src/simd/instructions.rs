@@ -25,6 +25,8 @@ pub trait Simd: Copy {
     const ROWS: usize;
     /// Whether loops are compiled for every size; where they are slow anyway, one version for all sizes will do.
     const SIZED: bool;
+    /// Whether keys are multiplied in registers.
+    const PRODUCTS: bool = false;
 
     /// Rows as columns.
     fn transpose(rows: [Self::Four; 4]) -> [Self::Four; 4];
@@ -43,30 +45,43 @@ pub trait Simd: Copy {
         let (keys, others) = (Self::keys(keys), Self::keys(others));
         Self::load_keys(&std::array::from_fn(|l| keys[l] & others[l]))
     }
+    /// The same key eight times.
+    #[inline(always)]
+    fn all_keys(key: u64) -> Self::Keys {
+        Self::load_keys(&[key; 8])
+    }
+    /// The bits that are in one of both alone.
+    #[inline(always)]
+    fn differ(keys: Self::Keys, others: Self::Keys) -> Self::Keys {
+        let (keys, others) = (Self::keys(keys), Self::keys(others));
+        Self::load_keys(&std::array::from_fn(|l| keys[l] ^ others[l]))
+    }
+    /// The keys without their lowest `BITS` bits, moved down.
+    #[inline(always)]
+    fn down<const BITS: u32>(keys: Self::Keys) -> Self::Keys {
+        Self::load_keys(&Self::keys(keys).map(|key| key >> BITS))
+    }
+    /// The halves of each key, exchanged.
+    #[inline(always)]
+    fn swap(keys: Self::Keys) -> Self::Keys {
+        Self::load_keys(&Self::keys(keys).map(|key| key.rotate_left(32)))
+    }
+    /// The products of the lower halves.
+    #[inline(always)]
+    fn product(keys: Self::Keys, others: Self::Keys) -> Self::Keys {
+        let low = |key: u64| key & 0xFFFF_FFFF;
+        let (keys, others) = (Self::keys(keys), Self::keys(others));
+        Self::load_keys(&std::array::from_fn(|l| low(keys[l]) * low(others[l])))
+    }
+    /// The numbers whose bits these are.
+    #[inline(always)]
+    fn numbers(keys: Self::Keys) -> Self::Eight {
+        Self::Eight::load(&Self::keys(keys).map(f64::from_bits))
+    }
     /// What a table says of each key.
     #[inline(always)]
     fn entries(table: &Entries, keys: Self::Keys) -> Self::Keys {
         Self::load_keys(&Self::keys(keys).map(|key| u64::from(table.get(key))))
-    }
-    /// Writes the numbers in the lanes of `bits` to the front of a slice of eight, in order; anything after them.
-    #[inline(always)]
-    fn compress(eight: Self::Eight, bits: u16, to: &mut [f64]) {
-        let (mut numbers, mut at) = ([0.0; 8], 0);
-        eight.store(&mut numbers);
-        for (l, &x) in numbers.iter().enumerate() {
-            to[at] = x;
-            at += usize::from(bits >> l & 1);
-        }
-    }
-    /// The first numbers of a slice of eight in the lanes of `bits`, in order; anything in the others.
-    #[inline(always)]
-    fn expand(from: &[f64], bits: u16) -> Self::Eight {
-        let (mut numbers, mut at) = ([0.0; 8], 0);
-        for (l, x) in numbers.iter_mut().enumerate() {
-            *x = from[at];
-            at += usize::from(bits >> l & 1);
-        }
-        Self::Eight::load(&numbers)
     }
 }
 

@@ -127,6 +127,7 @@ impl Simd for Avx2 {
     type Half = F32x8;
     const ROWS: usize = 4;
     const SIZED: bool = true;
+    const PRODUCTS: bool = true;
 
     #[inline(always)]
     fn transpose(rows: [F64x4; 4]) -> [F64x4; 4] {
@@ -187,6 +188,41 @@ impl Simd for Avx2 {
         unsafe { [_mm256_and_si256(keys[0], others[0]), _mm256_and_si256(keys[1], others[1])] }
     }
     #[inline(always)]
+    fn all_keys(key: u64) -> Self::Keys {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { [_mm256_set1_epi64x(key as i64); 2] }
+    }
+    #[inline(always)]
+    fn differ(keys: Self::Keys, others: Self::Keys) -> Self::Keys {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { [_mm256_xor_si256(keys[0], others[0]), _mm256_xor_si256(keys[1], others[1])] }
+    }
+    #[inline(always)]
+    fn down<const BITS: u32>(keys: Self::Keys) -> Self::Keys {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe {
+            [
+                _mm256_srl_epi64(keys[0], _mm_cvtsi32_si128(BITS as i32)),
+                _mm256_srl_epi64(keys[1], _mm_cvtsi32_si128(BITS as i32)),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn swap(keys: Self::Keys) -> Self::Keys {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { [_mm256_shuffle_epi32::<0xB1>(keys[0]), _mm256_shuffle_epi32::<0xB1>(keys[1])] }
+    }
+    #[inline(always)]
+    fn product(keys: Self::Keys, others: Self::Keys) -> Self::Keys {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { [_mm256_mul_epu32(keys[0], others[0]), _mm256_mul_epu32(keys[1], others[1])] }
+    }
+    #[inline(always)]
+    fn numbers(keys: Self::Keys) -> Self::Eight {
+        // SAFETY: the caller is compiled for AVX2; registers alone.
+        unsafe { Group([F64x4(_mm256_castsi256_pd(keys[0])), F64x4(_mm256_castsi256_pd(keys[1]))]) }
+    }
+    #[inline(always)]
     fn entries(table: &Entries, keys: Self::Keys) -> Self::Keys {
         let words: *const i32 = table.words().as_ptr().cast();
         // SAFETY: the caller is compiled for AVX2; the mask keeps indices within the table's keys, after which there is a
@@ -197,50 +233,6 @@ impl Simd for Avx2 {
             let second = _mm256_i64gather_epi32::<2>(words, _mm256_and_si256(keys[1], last));
             [_mm256_cvtepu32_epi64(_mm_and_si128(first, low)), _mm256_cvtepu32_epi64(_mm_and_si128(second, low))]
         }
-    }
-    #[inline(always)]
-    fn compress(Group([first, second]): Self::Eight, bits: u16, to: &mut [f64]) {
-        let (low, high) = (usize::from(bits & 0xF), usize::from(bits >> 4 & 0xF));
-        permuted(first, &FRONT[low]).store(to);
-        permuted(second, &FRONT[high]).store(&mut to[low.count_ones() as usize..]);
-    }
-    #[inline(always)]
-    fn expand(from: &[f64], bits: u16) -> Self::Eight {
-        let (low, high) = (usize::from(bits & 0xF), usize::from(bits >> 4 & 0xF));
-        let second = F64x4::load(&from[low.count_ones() as usize..]);
-        Group([permuted(F64x4::load(from), &APART[low]), permuted(second, &APART[high])])
-    }
-}
-
-/// By the bits of a mask, the halves of the numbers that its lanes hold, moved to the front; and back.
-static FRONT: [[i32; 8]; 16] = moves(false);
-static APART: [[i32; 8]; 16] = moves(true);
-
-const fn moves(apart: bool) -> [[i32; 8]; 16] {
-    let mut all = [[0; 8]; 16];
-    let mut bits = 0;
-    while bits < 16 {
-        let (mut lane, mut at) = (0, 0);
-        while lane < 4 {
-            if bits >> lane & 1 == 1 {
-                let (to, from) = if apart { (lane, at) } else { (at, lane) };
-                all[bits][2 * to] = 2 * from as i32;
-                all[bits][2 * to + 1] = 2 * from as i32 + 1;
-                at += 1;
-            }
-            lane += 1;
-        }
-        bits += 1;
-    }
-    all
-}
-
-#[inline(always)]
-fn permuted(F64x4(numbers): F64x4, order: &[i32; 8]) -> F64x4 {
-    // SAFETY: the caller is compiled for AVX2; reads the 8 indices of `order`.
-    unsafe {
-        let order = _mm256_loadu_si256(order.as_ptr().cast());
-        F64x4(_mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(numbers), order)))
     }
 }
 
@@ -257,6 +249,7 @@ impl Simd for Avx512 {
     type Half = F32x8Masked;
     const ROWS: usize = 8;
     const SIZED: bool = true;
+    const PRODUCTS: bool = true;
 
     #[inline(always)]
     fn transpose(rows: [F64x4; 4]) -> [F64x4; 4] {
@@ -303,6 +296,36 @@ impl Simd for Avx512 {
         unsafe { _mm512_and_si512(keys, others) }
     }
     #[inline(always)]
+    fn all_keys(key: u64) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { _mm512_set1_epi64(key as i64) }
+    }
+    #[inline(always)]
+    fn differ(keys: __m512i, others: __m512i) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { _mm512_xor_si512(keys, others) }
+    }
+    #[inline(always)]
+    fn down<const BITS: u32>(keys: __m512i) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { _mm512_srli_epi64::<BITS>(keys) }
+    }
+    #[inline(always)]
+    fn swap(keys: __m512i) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { _mm512_rol_epi64::<32>(keys) }
+    }
+    #[inline(always)]
+    fn product(keys: __m512i, others: __m512i) -> __m512i {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { _mm512_mul_epu32(keys, others) }
+    }
+    #[inline(always)]
+    fn numbers(keys: __m512i) -> F64x8 {
+        // SAFETY: the caller is compiled for AVX-512F; registers alone.
+        unsafe { F64x8(_mm512_castsi512_pd(keys)) }
+    }
+    #[inline(always)]
     fn entries(table: &Entries, keys: __m512i) -> __m512i {
         // SAFETY: the caller is compiled for AVX-512F; the mask keeps indices within the table's keys, after which there is
         // a word more, so the 32 bits that are read from each lie in the table.
@@ -311,16 +334,5 @@ impl Simd for Avx512 {
             let found = _mm512_i64gather_epi32::<2>(keys, table.words().as_ptr().cast());
             _mm512_cvtepu32_epi64(_mm256_and_si256(found, _mm256_set1_epi32(0xFFFF)))
         }
-    }
-    #[inline(always)]
-    fn compress(F64x8(eight): F64x8, bits: u16, to: &mut [f64]) {
-        // SAFETY: the caller is compiled for AVX-512F; registers alone.
-        F64x8(unsafe { _mm512_maskz_compress_pd(bits as u8, eight) }).store(to);
-    }
-    #[inline(always)]
-    fn expand(from: &[f64], bits: u16) -> F64x8 {
-        let F64x8(numbers) = F64x8::load(from);
-        // SAFETY: the caller is compiled for AVX-512F; registers alone.
-        F64x8(unsafe { _mm512_maskz_expand_pd(bits as u8, numbers) })
     }
 }

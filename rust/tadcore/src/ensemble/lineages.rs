@@ -90,6 +90,13 @@ impl Numbers {
         if self.own.is_empty() { self.first + row } else { self.own[row as usize] }
     }
 
+    /// Those of many rows.
+    pub(super) fn of_all(&self, rows: &[u32], trials: &mut [u64]) {
+        for (trial, &row) in trials.iter_mut().zip(rows) {
+            *trial = if self.own.is_empty() { self.first + u64::from(row) } else { self.own[row as usize] };
+        }
+    }
+
     /// Whether rows may part.
     pub(super) fn part(&self) -> bool {
         !self.own.is_empty()

@@ -21,7 +21,7 @@ mod philox;
 
 pub use chain::{Begin, Chain, NEVER, Walk};
 pub use normal::normal;
-pub(crate) use normal::{ln, normals};
+pub(crate) use normal::{Tails, ln, normals};
 pub(crate) use philox::{Counters, first_uniforms};
 pub use philox::{philox, uniform};
 

@@ -1,9 +1,9 @@
 //! Normal numbers by inversion: Φ⁻¹(u) by the rational functions of Wichura, *Algorithm AS 241*, PPND16 (Applied
 //! Statistics 37, 1988), to about 16 digits.
 //!
-//! One number, or many at once. The many take the middle part together and the tails, every seventh number, together
-//! again, in plain loops that the compiler does side by side; the logarithm is the `libm` crate's, written out so that it
-//! can be among them, and bitwise equal to it.
+//! One number, or many at once. The many take the middle part together; the tails, every seventh number, are listed and
+//! taken together again. The logarithm is the `libm` crate's, written out so that the compiler does it side by side, and
+//! bitwise equal to it.
 
 #![allow(clippy::excessive_precision, reason = "the digits as published")]
 
@@ -132,11 +132,13 @@ pub fn ln(p: f64) -> f64 {
         1.531_383_769_920_937_332e-1,
         1.479_819_860_511_658_591e-1,
     ];
+    /// The upper half of √½, and an exponent under which a double's last bits are a whole number.
+    const ROOT: u64 = 0x3FE6_A09E << 32;
+    const WHOLE: u64 = 1075 << 52;
     // p = 2^k (1 + f) with 1 + f between √½ and √2.
-    let bits = p.to_bits();
-    let high = (bits >> 32) + (0x3FF0_0000 - 0x3FE6_A09E);
-    let k = f64::from((high >> 20) as i32 - 1023);
-    let f = f64::from_bits(((high & 0xF_FFFF) + 0x3FE6_A09E) << 32 | bits & 0xFFFF_FFFF) - 1.0;
+    let bits = p.to_bits() + ((1023 << 52) - ROOT);
+    let k = f64::from_bits(bits >> 52 | WHOLE) - f64::from_bits(WHOLE | 1023);
+    let f = f64::from_bits((bits & ((1 << 52) - 1)) + ROOT) - 1.0;
     let half = 0.5 * f * f;
     let s = f / (2.0 + f);
     let z = s * s;
@@ -146,62 +148,95 @@ pub fn ln(p: f64) -> f64 {
     s * (half + (odd + even)) + k * LN2[1] - half + f + k * LN2[0]
 }
 
-/// |u − ½| up to which √(−ln p) is at most 5, and a little less: beyond, numbers are taken one by one.
-const NOT_FAR: f64 = 0.5 - 2e-11;
+/// Where the fractions of the middle part leave off, and what is computed there instead.
+pub struct Tails<const T: usize> {
+    /// Those beyond, a bit for each number, eight in a byte.
+    beyond: [u8; T],
+    /// Which they are, one after another, and their p, then their sizes.
+    which: [u16; T],
+    sizes: [f64; T],
+}
 
-/// A fraction at r.
+impl<const T: usize> Tails<T> {
+    /// Room for `T` numbers.
+    pub fn new() -> Self {
+        Self { beyond: [0; T], which: [0; T], sizes: [0.0; T] }
+    }
+}
+
+/// Fractions at several r: two chains of operations each, side by side, so that none waits for another.
 #[inline(always)]
-fn fraction<N: Number>([above, below]: &Fraction, r: N) -> [N; 2] {
-    let (mut over, mut under) = (N::splat(above[0]), N::splat(below[0]));
+fn fractions<N: Number, const G: usize>([above, below]: &Fraction, r: [N; G]) -> [[N; G]; 2] {
+    let (mut over, mut under) = ([N::splat(above[0]); G], [N::splat(below[0]); G]);
     for c in 1..8 {
-        over = over * r + N::splat(above[c]);
-        under = under * r + N::splat(below[c]);
+        for g in 0..G {
+            over[g] = over[g] * r[g] + N::splat(above[c]);
+            under[g] = under[g] * r[g] + N::splat(below[c]);
+        }
     }
     [over, under]
 }
 
-/// `scale` times the [`normal`] of every number, eight at a time; the numbers are as many as eights, and multiples of 2⁻⁵³
-/// as all that are drawn.
+/// Eights whose middle parts are computed together.
+const TOGETHER: usize = 2;
+/// Tails that are computed together.
+const TAILS: usize = 32;
+
+/// `scale` times the [`normal`] of every number, multiples of 2⁻⁵³ as all that are drawn: 64, or a multiple of it.
 #[inline(always)]
-pub fn normals<V: Simd, const T: usize>(numbers: &[f64; T], scale: f64, to: &mut [f64; T]) {
-    // The middle part of all; the p of those in the tails, moved together, and which they are, a bit each.
-    let (mut tails, mut count, mut which) = ([0.25; T], 0, [0_u8; T]);
-    let half = V::Eight::splat(0.5);
-    let mut most = V::Eight::splat(0.0);
-    for group in 0..T / 8 {
-        let q = V::Eight::load(&numbers[8 * group..]) - half;
-        let [over, under] = fraction(&CENTRAL, V::Eight::splat(0.180625) - q * q);
-        (over * q / under).store(&mut to[8 * group..]);
-        let bits = V::Eight::bits(V::Eight::splat(MIDDLE).less(q.abs()));
-        // Of a multiple of 2⁻⁵³ exactly u, or 1 − u.
-        V::compress(half - q.abs(), bits, &mut tails[count..]);
-        most = most.or_larger(q.abs());
-        which[group] = bits as u8;
-        count += bits.count_ones() as usize;
-    }
-    let padded = count.next_multiple_of(8).min(T);
-    tails[count..padded].fill(0.25);
-    if V::Eight::bits(V::Eight::splat(NOT_FAR).less(most)) == 0 {
-        for p in &mut tails[..padded] {
-            let r = (-ln(*p)).sqrt() - 1.6;
-            let [over, under] = fraction(&NEAR, r);
-            *p = over / under;
+pub fn normals<V: Simd, const T: usize>(numbers: &[f64; T], scale: f64, to: &mut [f64; T], tails: &mut Tails<T>) {
+    let (half, by) = (V::Eight::splat(0.5), V::Eight::splat(scale));
+    for at in (0..T).step_by(8 * TOGETHER) {
+        let mut r = [half; TOGETHER];
+        for g in 0..TOGETHER {
+            let q = V::Eight::load(&numbers[at + 8 * g..]) - half;
+            tails.beyond[at / 8 + g] = V::Eight::bits(V::Eight::splat(MIDDLE).less(q.abs())) as u8;
+            r[g] = V::Eight::splat(0.180625) - q * q;
         }
-    } else {
-        for p in &mut tails[..count] {
-            *p = tail((-ln(*p)).sqrt());
+        let [over, under] = fractions(&CENTRAL, r);
+        for g in 0..TOGETHER {
+            let q = V::Eight::load(&numbers[at + 8 * g..]) - half;
+            (by * (over[g] * q / under[g])).store(&mut to[at + 8 * g..]);
         }
     }
-    let mut from = 0;
-    for group in 0..T / 8 {
+    let mut count = 0;
+    for (word, eight) in tails.beyond[..T / 8].as_chunks().0.iter().enumerate() {
+        let mut bits = u64::from_le_bytes(*eight);
+        while bits != 0 {
+            let at = 64 * word + bits.trailing_zeros() as usize;
+            tails.which[count] = at as u16;
+            // Exactly u, or 1 − u.
+            tails.sizes[count] = 0.5 - (numbers[at] - 0.5).abs();
+            count += 1;
+            bits &= bits - 1;
+        }
+    }
+    let padded = count.next_multiple_of(TAILS).min(T);
+    tails.sizes[count..padded].fill(0.25);
+    let mut far = 0;
+    for sizes in tails.sizes[..padded].as_chunks_mut::<TAILS>().0 {
+        for size in sizes.iter_mut() {
+            *size = (-ln(*size)).sqrt();
+        }
+        for sizes in sizes.as_chunks_mut::<16>().0 {
+            let root = [V::Eight::load(&sizes[..8]), V::Eight::load(&sizes[8..])];
+            let five = V::Eight::splat(5.0);
+            far |= V::Eight::bits(five.less(root[0].or_larger(root[1])));
+            let [over, under] = fractions(&NEAR, [root[0] - V::Eight::splat(1.6), root[1] - V::Eight::splat(1.6)]);
+            (by * (over[0] / under[0])).store(&mut sizes[..8]);
+            (by * (over[1] / under[1])).store(&mut sizes[8..]);
+        }
+    }
+    let which = &tails.which[..count];
+    if far != 0 {
+        for (&at, size) in which.iter().zip(&mut tails.sizes) {
+            *size = scale * normal(numbers[usize::from(at)]).abs();
+        }
+    }
+    for (&at, &size) in which.iter().zip(&tails.sizes) {
         // The fraction of the middle part has no pole out there, and the sign of u − ½.
-        let x = V::Eight::load(&to[8 * group..]);
-        let start = from.min(T - 8);
-        let size = V::expand(&tails[start..], which[group].into());
-        let size = V::Eight::select(x.less(V::Eight::splat(0.0)), V::Eight::splat(0.0) - size, size);
-        let x = V::Eight::select(V::Eight::mask(which[group].into()), size, x);
-        (V::Eight::splat(scale) * x).store(&mut to[8 * group..]);
-        from += which[group].count_ones() as usize;
+        let x = &mut to[usize::from(at)];
+        *x = size.copysign(*x);
     }
 }
 
@@ -241,10 +276,11 @@ mod tests {
 
     #[test]
     fn many_at_once_are_bitwise_one_after_another() {
+        let mut tails = Tails::new();
         for first in (0..1_000_000).step_by(128) {
             let numbers: [f64; 128] = std::array::from_fn(|t| uniform(bits(first + t as u64)));
             let mut all = [0.0; 128];
-            normals::<Baseline, _>(&numbers, 1.0, &mut all);
+            normals::<Baseline, _>(&numbers, 1.0, &mut all, &mut tails);
             for (x, u) in all.into_iter().zip(numbers) {
                 assert!(x.to_bits() == normal(u).to_bits(), "{u}: {x}");
             }
@@ -253,11 +289,11 @@ mod tests {
         let drawn = |u: f64| (u * 2f64.powi(53)).round() * 2f64.powi(-53);
         for fill in [0.5, drawn(0.01), drawn(0.99), drawn(1e-15), uniform(0), uniform(u64::MAX)] {
             for last in [0.5, drawn(0.001), drawn(1e-14)] {
-                let (mut numbers, mut all) = ([fill; 16], [0.0; 16]);
-                numbers[15] = last;
-                normals::<Baseline, _>(&numbers, 3.0, &mut all);
-                assert_eq!(all[..15], [3.0 * normal(fill); 15]);
-                assert_eq!(all[15], 3.0 * normal(last));
+                let (mut numbers, mut all) = ([fill; 128], [0.0; 128]);
+                numbers[127] = last;
+                normals::<Baseline, _>(&numbers, 3.0, &mut all, &mut tails);
+                assert_eq!(all[..127], [3.0 * normal(fill); 127]);
+                assert_eq!(all[127], 3.0 * normal(last));
             }
         }
     }

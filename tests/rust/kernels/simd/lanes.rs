@@ -127,15 +127,20 @@ fn check_whole<V: Simd>() {
     (0..64).for_each(|key| table.set(key, (key * 1021 + 3) as u16));
     let asked = [0, 63, 1, 62, 64 + 5, u64::MAX, 17, 1 << 40];
     assert_eq!(V::keys(V::entries(&table, V::load_keys(&asked))), asked.map(|key| (key % 64 * 1021 + 3) & 0xFFFF));
-    for bits in 0..=255_u16 {
-        let chosen: Vec<f64> = (0..8).filter(|l| bits >> l & 1 == 1).map(|l| numbers[l]).collect();
-        let mut front = [0.0; 8];
-        V::compress(V::Eight::load(&numbers), bits, &mut front);
-        assert_eq!(front[..chosen.len()], chosen);
-        let apart = V::expand(&numbers[8..], bits);
-        let lanes = (0..8).filter(|l| bits >> l & 1 == 1);
-        lanes.enumerate().for_each(|(at, lane)| assert_eq!(apart.lane(lane), numbers[8 + at]));
-    }
+    // Halves of keys: multiplied, exchanged, moved down; and bits as those of numbers.
+    let words = V::keys(keys);
+    let found = V::keys(V::differ(keys, V::load_keys(&others)));
+    assert_eq!(found, std::array::from_fn(|l| words[l] ^ others[l]));
+    let odd: [u64; 8] =
+        std::array::from_fn(|l| (others[l] | 1 << 63 | 0xFFFF_0000).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let low = |word: u64| word & 0xFFFF_FFFF;
+    let found = V::keys(V::product(V::load_keys(&odd), V::all_keys(0xFEDC_BA98_D251_1F53)));
+    assert_eq!(found, odd.map(|word| low(word) * 0xD251_1F53));
+    assert_eq!(V::keys(V::swap(V::load_keys(&odd))), odd.map(|word| word.rotate_left(32)));
+    assert_eq!(V::keys(V::down::<12>(V::load_keys(&odd))), odd.map(|word| word >> 12));
+    assert_eq!(V::keys(V::down::<32>(V::load_keys(&odd))), odd.map(|word| word >> 32));
+    let found = V::numbers(V::load_keys(&numbers.first_chunk::<8>().expect("sixteen numbers").map(f64::to_bits)));
+    (0..8).for_each(|lane| assert_eq!(found.lane(lane), numbers[lane]));
 }
 
 #[test]
