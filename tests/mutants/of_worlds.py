@@ -57,8 +57,8 @@ MUTANTS = {
     "ensemble/noise.rs": [
         (
             "batches: disturbance of the attacker",
-            "let by = «V::Eight::load(&by[at..]) - V::Eight::load(&own[at..])»",
-            "V::Eight::load(&by[at..]) + V::Eight::load(&own[at..])",
+            "let by = «V::Eight::load(&by[block * BLOCK..]) - V::Eight::load(&own[block * BLOCK..])»",
+            "V::Eight::load(&by[block * BLOCK..]) + V::Eight::load(&own[block * BLOCK..])",
         ),
     ],
     "ensemble/network.rs": [

@@ -16,9 +16,11 @@ use tadcore::synthesis::{Gains, Options, Problem, Status, Synthesizer};
 /// By how much, relatively, Θ may be above the lowest known.
 const LOWER: f64 = 1e-9;
 
-/// Iterations of all descents of [`of_games`] together, measured in November 2026, and what may come on top. Descents
-/// from fits of GᵀRG are a sixth of them: without they were 56,005, and seven of 8,000 visited pairs were missed, not one.
-const ITERATIONS: (usize, f64) = (67_530, 1.03);
+/// Iterations of all descents of [`of_games`] together, of fewer than five constrained players and of more, measured in
+/// November 2026, and what may come on top. Descents from fits of GᵀRG are a sixth of them: without they were 56,005, and
+/// seven of 8,000 visited pairs were missed, not one. Of five players and more they were 42,573 before rows were exchanged
+/// further up: three of 8,000 pairs, all of five defenders, were missed.
+const ITERATIONS: ([usize; 2], f64) = ([24_957, 61_776], 1.03);
 
 /// One instant and network, with the lowest Θ known.
 struct Instant {
@@ -197,6 +199,12 @@ fn a_narrow_valley_is_followed_to_its_floor() {
 /// figure for a reason only; lower it when a change saves work.
 #[test]
 fn the_work_is_no_more_than_measured() {
-    let iterations: usize = solved(&of_games()).iter().map(|found| found.iterations).sum();
-    assert!(iterations as f64 <= ITERATIONS.1 * ITERATIONS.0 as f64, "{iterations}");
+    let instants = of_games();
+    let mut iterations = [0; 2];
+    for (instant, found) in instants.iter().zip(solved(&instants)) {
+        iterations[usize::from(instant.topology.rows() >= 5)] += found.iterations;
+    }
+    for (found, measured) in iterations.iter().zip(ITERATIONS.0) {
+        assert!(*found as f64 <= ITERATIONS.1 * measured as f64, "{iterations:?}");
+    }
 }

@@ -108,7 +108,7 @@ def test_multistart_never_goes_lower():
 
 def hard_instants(reference):
     """(game, step, network, lowest Theta known) where Newton's method from the canonical start ends higher."""
-    for name in ("hard_instants", "reversed_rows", "lower_theta", "dominated_theta"):
+    for name in ("hard_instants", "reversed_rows", "lower_theta", "dominated_theta", "five_defenders_theta"):
         for entry in reference(name)["instants"]:
             yield game_of(entry), entry["step"], entry["network"], entry["theta"]
     for entry in reference("random_games")["games"]:
@@ -128,7 +128,8 @@ def test_instants_where_newton_alone_ends_too_high(reference):
 
 
 def test_the_rows_with_a_lower_theta_are_admissible_and_have_it(reference):
-    for entry in (*reference("lower_theta")["instants"], *reference("dominated_theta")["instants"]):
+    names = ("lower_theta", "dominated_theta", "five_defenders_theta")
+    for entry in (entry for name in names for entry in reference(name)["instants"]):
         game, rows = game_of(entry), np.array(entry["rows"])
         A = from_number(entry["network"], game.m, game.N)
         for i, row in enumerate(rows):

@@ -7,8 +7,9 @@
 //! - one gain reversed, where it matters.
 //!
 //! Others are many and seldom lead lower. One row or two reversed are listed where the start itself is not far above the
-//! best point; the rest where it is hardly above: two players' rows exchanged, with any signs; i takes the row of j and
-//! plays it beside j; i takes the row of j, j that of k, and k plays next to nothing.
+//! best point; the rest where it is hardly above: two players' rows exchanged, with any signs (in large teams as far up as
+//! rows are reversed); i takes the row of j and plays it beside j; i takes the row of j, j that of k, and k plays next to
+//! nothing.
 
 use super::candidate::Candidate;
 use crate::error::Stopped;
@@ -27,6 +28,10 @@ const REVERSED: f64 = 2.5;
 const OTHERS: f64 = 1.1;
 /// Distance of such a start from the best point, relative to H: nearer ones lead back.
 const AWAY: f64 = 0.1;
+/// Players from which on rows are exchanged as far up as they are reversed, and small rows reversed, too: with five, lower
+/// minima lay behind exchanges up to 2.2 times as high and a row of 2 % of H, with fewer behind none.
+const MANY: usize = 5;
+const SMALL: f64 = 0.01;
 
 /// The rows of H at the best point of a candidate, and what Θ is made of there.
 pub(crate) struct Moves<'a> {
@@ -143,6 +148,8 @@ impl<'a> Moves<'a> {
     where
         A: FnMut(&[f64]) -> Result<(), Stopped>,
     {
+        let one = change.len() == 1 && self.problem.rows >= MANY;
+        let away = if one { SMALL } else { AWAY };
         if limit.is_finite() {
             let distance: f64 = change
                 .iter()
@@ -151,7 +158,7 @@ impl<'a> Moves<'a> {
                 })
                 .sum();
             let limit = limit * self.candidate.reached.value;
-            if distance <= (AWAY * self.size).powi(2) || self.theta(change, limit, scratch) >= limit {
+            if distance <= (away * self.size).powi(2) || self.theta(change, limit, scratch) >= limit {
                 return Ok(());
             }
         }
@@ -185,12 +192,13 @@ impl<'a> Moves<'a> {
         let whole: Vec<f64> = (0..m).map(|i| norm(self.row(i))).collect();
         let kept: Vec<f64> = all.chunks_exact(n).map(norm).collect();
         let keeps = |i: usize, j: usize| kept[i * m + j] > 0.0 && kept[i * m + j] >= KEPT * whole[j];
+        let exchanged = if m >= MANY { REVERSED } else { OTHERS };
         for (k, &i) in self.players.iter().enumerate() {
             for &j in &self.players[k + 1..] {
                 let (a, b) = (taken(i, j), taken(j, i));
                 self.near(&[(i, self.row(i), -1.0), (j, self.row(j), -1.0)], REVERSED, &mut scratch, add)?;
                 for (of_a, of_b) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
-                    self.near(&[(i, a, of_a), (j, b, of_b)], OTHERS, &mut scratch, add)?;
+                    self.near(&[(i, a, of_a), (j, b, of_b)], exchanged, &mut scratch, add)?;
                 }
             }
         }
