@@ -4,10 +4,10 @@ MUTANTS = {
     "random/philox.rs": [
         ("Philox: which key", "[p1 >> 32 ^ x[1] ^ «key[0]»", "key[1]"),
         ("Philox: halves", "p0 >> 32 ^ «x[3]»", "x[1]"),
-        ("uniform: the middle of an interval", "- («1.0 - f64::EPSILON / 2.0»)", "1.0"),
+        ("uniform: the middle of an interval", "= «1.0 - f64::EPSILON / 2.0»;", "1.0"),
         ("uniform, many: B", "[(words[1], words[0]), («words[3], words[2]»)]", "words[1], words[0]"),
         ("Philox, many: the second round", "low(p) ^ «keys[1][1]»", "keys[1][0]"),
-        ("Philox, many: trials beyond 2³²", "if «!self.alike»", "false"),
+        ("Philox, many: trials beyond 2³²", "if V::PRODUCTS && «self.alike» {", "true"),
     ],
     "random/mod.rs": [
         ("draws: a trial beyond 2³²", "bits | «(self.trial >> 32) as u32»", "0"),
@@ -20,9 +20,14 @@ MUTANTS = {
         ("normal: far tail", "(&FAR, «root - 5.0»)", "root - 1.6"),
         ("normal: which tail", "libm::log(if «q < 0.0» {", "q > 0.0"),
         ("normal: sign", "if «q < 0.0» { -size }", "q > 0.0"),
-        ("normal, many: which tail", "select(«x.less(V::Eight::splat(0.0))», V", "V::Eight::splat(0.0).less(x)"),
-        ("normal, many: near tail", "(-ln(*p)).sqrt() - «1.6»", "-1.6"),
-        ("normal, many: far tails", "if «V::Eight::bits(V::Eight::splat(NOT_FAR).less(most)) == 0»", "true"),
+        ("normal, many: which tail", "tails.sizes[count] = «0.5 - (numbers[at] - 0.5).abs()»;", "numbers[at]"),
+        ("normal, many: sign", "*x = «size.copysign(*x)»;", "size"),
+        (
+            "normal, many: near tail",
+            "(&NEAR, [«root[0] - V::Eight::splat(1.6)», root[1]",
+            "root[0] + V::Eight::splat(1.6)",
+        ),
+        ("normal, many: far tails", "if «far != 0» {", "false"),
         ("ln: halves", "s * («half + (odd + even)»)", "half - (odd + even)"),
     ],
     "random/chain.rs": [
