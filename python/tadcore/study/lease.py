@@ -30,6 +30,7 @@ from .place import Place, reason
 BEAT = 10.0  # seconds between two renewals
 SILENCE = 35.0  # seconds without one after which a lease is nobody's
 _LARGEST = 4096
+_READS = 5  # of a lease that is renewed just then: its length may be of one writing, its content of another
 
 
 class Lease:
@@ -98,15 +99,18 @@ def leased(place: Place) -> Iterator[Lease]:
 
 def _read(place: Place) -> dict[str, Any] | None:
     """What the lease of a place says; None where there is none, and nothing of what is no lease."""
-    try:
-        said = json.loads(place.read(LOCK, _LARGEST))
-    except FileNotFoundError:
-        return None
-    except OSError as error:
-        raise StoreError(place.at(LOCK), f"it cannot be read ({reason(error)})", "check the place") from None
-    except (ValueError, RecursionError):
-        return {}
-    return said if isinstance(said, dict) else {}
+    for attempt in range(_READS):
+        try:
+            said = json.loads(place.read(LOCK, _LARGEST))
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise StoreError(place.at(LOCK), f"it cannot be read ({reason(error)})", "check the place") from None
+        except (ValueError, RecursionError):
+            time.sleep(0.02 * attempt)
+            continue
+        return said if isinstance(said, dict) else {}
+    return {}
 
 
 def _dead(owner: dict[str, Any]) -> bool:

@@ -302,6 +302,21 @@ def test_of_two_runs_one_has_the_place():
     assert LOCK not in place.names()
 
 
+def test_a_lease_that_is_renewed_while_it_is_read_is_read_again():
+    whole = b'{"token": "a", "beat": 10}'
+
+    class Torn:
+        reads = 0
+
+        def read(self, name, most):
+            self.reads += 1
+            return whole[:-1] if self.reads < 3 else whole
+
+    place = Torn()
+    assert lease._read(place) == json.loads(whole)
+    assert place.reads == 3
+
+
 @pytest.mark.parametrize("left", [b"no lease", b"[]", b"{}", json.dumps({"pid": 1, "machine": "another"}).encode()])
 def test_a_lease_that_is_not_renewed_is_taken_over(left):
     place = memory("silent")
