@@ -50,6 +50,20 @@ def study(trials=2 * CHUNK + 500, seed=7, **changes):
     return tadcore.Study(**{"sc": calm(), "vary": vary, "trials": trials, "seed": seed, **changes})
 
 
+def to_kill(group, pause):
+    """The script of a child that plays a study slowly enough to be met on the way, into the store it is told."""
+    return f"""
+import sys, time
+from study_cases import CHUNK, study
+from tadcore.study import parts
+from tadcore.study.plan import Plan
+parts.GROUP = {group}
+play = Plan.play
+Plan.play = lambda *given: (time.sleep({pause}), play(*given))[1]
+study(20 * CHUNK).run(store=sys.argv[1], threads=1)
+"""
+
+
 def ring(rng, size):
     """A callable sampler: points of a circle."""
     angle = rng.uniform(0, 2 * np.pi, size)

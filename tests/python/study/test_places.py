@@ -15,7 +15,7 @@ import pytest
 from pyarrow import fs
 
 import tadcore
-from study_cases import CHUNK, parts, study
+from study_cases import CHUNK, parts, study, to_kill
 from tadcore import ScenarioError, StoreError
 from tadcore.cli.app import main
 from tadcore.study import lease, merge_store, verify_store
@@ -153,16 +153,7 @@ def test_a_dask_cluster_writes_to_a_bucket(s3, alone):
     assert s3.objects("dask") == parts(alone[1])
 
 
-KILLED = """
-import sys, time
-from study_cases import CHUNK, study
-from tadcore.study import parts
-from tadcore.study.plan import Plan
-parts.GROUP = 2
-play = Plan.play
-Plan.play = lambda *given: (time.sleep(0.1), play(*given))[1]  # slow enough to be met on the way
-study(20 * CHUNK).run(store=sys.argv[1], threads=1)
-"""
+KILLED = to_kill(group=2, pause=0.1)
 
 
 def child(url):

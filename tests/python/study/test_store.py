@@ -19,7 +19,7 @@ import pytest
 from scipy import stats
 
 import tadcore
-from study_cases import CHUNK, edited, part, parts, resealed, ring, study
+from study_cases import CHUNK, edited, part, parts, resealed, ring, study, to_kill
 from tadcore import StoreError
 from tadcore.sampling import Box, Choice
 from tadcore.study.manifest import Manifest
@@ -89,16 +89,7 @@ def test_readers_of_parquet_need_nothing_of_ours(clean):
     assert [count for _, count in counted] == list(result.counts().values())
 
 
-KILLED = """
-import sys, time
-from study_cases import CHUNK, study
-from tadcore.study import parts
-from tadcore.study.plan import Plan
-parts.GROUP = 1
-play = Plan.play
-Plan.play = lambda *given: (time.sleep(0.05), play(*given))[1]  # slow enough to be met on the way
-study(20 * CHUNK).run(store=sys.argv[1], threads=1)
-"""
+KILLED = to_kill(group=1, pause=0.05)
 
 
 def test_kill_9_loses_only_what_was_in_flight(tmp_path):
