@@ -34,8 +34,8 @@ from tadcore.errors import ScenarioError
 from tadcore.scenarios.given import ScenarioLike
 from tadcore.simulation.batch import Batch
 from tadcore.statistics import TrialOutcomes, outcome_names
-from tadcore.statistics.comparison import discordant
 from tadcore.statistics.confidence import Confidence
+from tadcore.statistics.differences import discordant
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radii import RadiusCurves
 from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_differences

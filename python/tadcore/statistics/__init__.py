@@ -4,7 +4,8 @@ Every function takes plain arrays of outcomes, or the result of a study, and ret
 table, converts to pandas, and is drawn by a function of `tadcore.plotting`.
 """
 
-from .comparison import Comparison, compare, difference_interval, paired
+from .comparison import Comparison, compare, paired
+from .differences import difference_interval
 from .incidence import Incidence, incidence, incidence_of
 from .intervals import OutcomeProbabilities, probabilities, probabilities_of, proportion_interval
 from .outcomes import TrialOutcomes, outcome_counts, outcome_names

@@ -13,7 +13,7 @@ from tadcore._shared.html import as_html, line, thinned
 from tadcore._shared.shares import estimate, percent
 from tadcore.errors import ScenarioError
 
-from .comparison import difference_interval
+from .differences import difference_interval
 from .outcomes import excluding
 from .single_radii import Breakpoints, SmallestRadius
 
