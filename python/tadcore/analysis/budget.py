@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from tadcore.statistics import outcome_names
 from tadcore.statistics.outcomes import as_level, indicators
 from tadcore.study.study import Study
 
-from .replays import starts_of
+from .replays import ending_of, starts_of
 from .searches import fresh_study, judged, search
 
 _ROOM = 1e-6  # of its capture radius, that a visibility radius is at least larger
@@ -182,7 +183,8 @@ class _Shared:
 
     def __init__(self, study: Study, threads: int | None) -> None:
         self.sc, self.rows = starts_of(study, None)
-        self.threads, self.seed, self.trials = threads, study.seed, len(self.rows)
+        self.trials = len(self.rows)
+        self._options: dict[str, Any] = {"threads": threads, "seed": study.seed, "termination": ending_of(study)}
         capture = np.atleast_2d(self.rows.capture_radii)[:, : self.sc.n]
         self.least = capture.max(axis=0) * (1.0 + _ROOM)
 
@@ -190,7 +192,5 @@ class _Shared:
         """Which trials ended in each outcome, last those that diverged: (4 + n, M)."""
         sight = np.array(self.rows.visibility_radii)
         sight[..., : self.sc.n] = radii
-        batch = simulate_batch(
-            self.sc, self.rows.positions, sight, self.rows.capture_radii, threads=self.threads, seed=self.seed
-        )
+        batch = simulate_batch(self.sc, self.rows.positions, sight, self.rows.capture_radii, **self._options)
         return indicators(batch.kind, batch.defender, self.sc.n, batch.diverged)

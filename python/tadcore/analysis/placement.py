@@ -98,7 +98,7 @@ def best_start(
     Parameters
     ----------
     study : Study
-        What varies, and how many trials each place is played with.
+        What varies, how many trials each place is played with, and when a game ends (`Study`'s ``termination``).
     player : str
         ``"d1"`` … ``"dn"``, ``"target"`` or ``"attacker"``.
     x, y, z : (low, high)

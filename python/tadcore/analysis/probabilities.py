@@ -131,6 +131,7 @@ def probability_map(
     ----------
     source : Study or StudyResult
         What varies, and the trials; played or not. Where it varies the start of this player, the grid takes its place.
+        A game ends as in the study, at an instant or at the crossing itself.
     player : str
         ``"d1"`` … ``"dn"``, ``"target"`` or ``"attacker"``.
     x, y : (low, high, count)

@@ -42,7 +42,7 @@ from tadcore.statistics.radius import RadiusCurve, RadiusKind, paired_difference
 from tadcore.study.study import Study
 
 from .breakpoints import breakpoints
-from .replays import Replays, refuse_random, seed_of, starts_of
+from .replays import Replays, ending_of, refuse_random, seed_of, starts_of
 
 
 @overload
@@ -103,7 +103,7 @@ def radius_curve(
     ----------
     source : Scenario, path, name, Study or StudyResult
         The game, or a study whose trials are played, again or for the first time. What it varies stays varied, but for
-        the radius in question.
+        the radius in question, and a game ends as in the study, at an instant or at the crossing itself.
     positions : array_like, shape (M, n + 2, dim), optional
         M independent starts; required with a Scenario, and not taken with a study.
     player : str or list of str
@@ -149,7 +149,8 @@ def radius_curve(
         refuse_random(sc, "refine", "leave it out; the curve itself shares failures and disturbances between radii")
     players = [player] if isinstance(player, str) else _several(player)
     draws = seed_of(source, seed)
-    games = [Replays(sc, rows, name, kind, threads, draws) for name in players]
+    ending = ending_of(source)
+    games = [Replays(sc, rows, name, kind, threads, draws, ending) for name in players]
     if len({each.player for each in games}) < len(games):
         raise ScenarioError("player", player, "players that are named once each")
     asked = [(each.checked("radii", radii), _reference(each, reference)) for each in games]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import Batch, simulate_batch
 from tadcore.simulation.hooks import as_seed
 from tadcore.simulation.starts import Rows, rows_of
+from tadcore.simulation.termination import Termination
 from tadcore.statistics import TrialOutcomes
 from tadcore.statistics.outcomes import indicators
 from tadcore.statistics.radius import RadiusKind
@@ -59,11 +61,24 @@ def seed_of(source: ScenarioLike | Study | TrialOutcomes, seed: int) -> int:
     return source.seed
 
 
+def ending_of(source: object) -> Termination:
+    """When the games of a study end; at the instants of the grid where a scenario was given."""
+    found: Termination = getattr(source, "termination", "sampled")
+    return found
+
+
 class Replays:
     """The same starts, with the same failures and disturbances, at any radius of one player, or of all defenders."""
 
     def __init__(
-        self, sc: Scenario, rows: Rows, player: str, kind: RadiusKind, threads: int | None, seed: int = 0
+        self,
+        sc: Scenario,
+        rows: Rows,
+        player: str,
+        kind: RadiusKind,
+        threads: int | None,
+        seed: int = 0,
+        termination: Termination = "sampled",
     ) -> None:
         player = label(player)
         if not isinstance(kind, str) or kind not in ("visibility", "capture"):
@@ -74,7 +89,8 @@ class Replays:
             raise ScenarioError("player", player, rule)
         team = [f"d{i + 1}" for i in range(sc.n)] if player == TEAM else [player]
         self.columns = [component(sc, f"{one}.{kind}_radius").row for one in team]
-        self.sc, self.rows, self.player, self.kind, self.threads, self.seed = sc, rows, player, kind, threads, seed
+        self.sc, self.rows, self.player, self.kind = sc, rows, player, kind
+        self._options: dict[str, Any] = {"threads": threads, "seed": seed, "termination": termination}
         self._own = np.array(sc.visibility_radii if kind == "visibility" else sc.capture_radii)[self.columns]
 
     @property
@@ -117,7 +133,7 @@ class Replays:
             varied = np.repeat(varied[np.newaxis], len(positions), axis=0)
         varied[..., self.columns] = radii
         sight, reach = (varied, capture) if self.kind == "visibility" else (visibility, varied)
-        return simulate_batch(self.sc, positions, sight, reach, threads=self.threads, seed=self.seed)
+        return simulate_batch(self.sc, positions, sight, reach, **self._options)
 
 
 class Placed:
@@ -125,7 +141,8 @@ class Placed:
 
     def __init__(self, source: Study | TrialOutcomes, player: str, threads: int | None) -> None:
         self.sc, self.rows = starts_of(source, None)
-        self.player, self.threads, self.seed = label(player), threads, source.seed
+        self.player = label(player)
+        self._options: dict[str, Any] = {"threads": threads, "seed": source.seed, "termination": ending_of(source)}
         if self.player not in self.sc.players:
             raise ScenarioError("player", player, f"one of {', '.join(self.sc.players)}")
         self.row = self.sc.players.index(self.player)
@@ -149,6 +166,6 @@ class Placed:
             radii if radii.ndim == 1 else np.tile(radii, (len(places), 1))
             for radii in (self.rows.visibility_radii, self.rows.capture_radii)
         )
-        batch = simulate_batch(self.sc, positions, sight, capture, threads=self.threads, seed=self.seed)
+        batch = simulate_batch(self.sc, positions, sight, capture, **self._options)
         events = indicators(batch.kind, batch.defender, self.sc.n, batch.diverged)
         return events.reshape(len(events), len(places), self.trials)

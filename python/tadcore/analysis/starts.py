@@ -71,6 +71,7 @@ def start_share(
             rows.visibility_radii,
             rows.capture_radii,
             threads=threads,
+            termination=study.termination,
             seed=study.seed,
             first_trial=first,
         )

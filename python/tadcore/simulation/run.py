@@ -128,7 +128,8 @@ class Run:
     def theta_price(self) -> Floats:
         """The price of team consistency, shape (L,): Θ under the criterion "component" less Θ under "paper".
 
-        At every instant with a network in force, 0 where nobody, or everybody, knows everything.
+        At every instant with a network in force, 0 where nobody, or everybody, knows everything. Both are the lowest Θ
+        that a search finds; where that under "component" is the lower one, the other was missed, and the price is 0.
         """
         from tadcore.game.compiled import game_of
 

@@ -80,8 +80,9 @@ def verify(
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     ScenarioError
-        The first argument is neither a scenario nor a run, or a run with hysteresis or dwell; a count or the seed is
-        out of its range; or a bound is asked for and Clarabel is not installed.
+        The first argument is neither a scenario nor a run, or it is a variant of the game (`Run.variant`): with
+        hysteresis or dwell, continuous termination, turning gains or a network from outside; a count or the seed is out
+        of its range; or a bound of order one is asked for and Clarabel is not installed.
 
     Examples
     --------

@@ -282,6 +282,16 @@ def test_a_game_over_at_once_has_no_events():
 # ---- externality
 
 
+@pytest.mark.parametrize(
+    "field", [{"sensing.mean_time_to_failure": 1.0}, {"communication.radius": 2.0}, {"attacker.disturbance": 0.1}]
+)
+def test_what_surrounds_a_game_has_no_play_in_continuous_time(field):
+    sc = tadcore.scenarios.load("paper-i1").replace(field)
+    for asked in (v.play_by_events, v.sliding_study):
+        with pytest.raises(tadcore.ScenarioError, match="failures, links or disturbances"):
+            asked(sc)
+
+
 def test_a_new_edge_moves_the_others_too():
     run = play("paper-i1")
     found = v.control_jumps(run)

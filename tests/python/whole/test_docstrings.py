@@ -2,22 +2,20 @@
 
 import doctest
 import importlib
+from pathlib import Path
 
 import pytest
 
-MODULES = ["", ".scenario.model", ".scenarios", ".game.equilibrium", ".game.network", ".game.synthesis"]
-MODULES += [
-    ".simulation.play",
-    ".simulation.batch",
-    ".sampling.shapes",
-    ".study.study",
-    ".analysis.sweeps",
-    ".analysis.maps",
-    ".analysis.certified",
-    ".analysis.rare_events",
-]
-MODULES += [".statistics.incidence", ".statistics.intervals", ".statistics.sequences"]
-MODULES += [".verification.every_check", ".verification.continuous.events"]
+import tadcore
+
+PACKAGE = Path(tadcore.__file__).parent
+FILES = sorted(file for file in PACKAGE.rglob("*.py") if ">>>" in file.read_text(encoding="utf-8"))
+MODULES = [".".join(("", *file.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__") for file in FILES]
+
+
+def test_the_examples_are_found():
+    assert len(MODULES) > 20
+    assert {"", ".scenarios", ".game.network", ".verification.bound.sampled"} <= set(MODULES)
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -170,6 +170,29 @@ def test_a_foreign_trajectory_is_drawn_by_the_same_figures(shown, agg):
             plotting.run_of(own.scenario, **given)
 
 
+@pytest.mark.parametrize(
+    ("last", "outcome"),
+    [
+        ({"d1": [0.09, 0], "d3": [0, 0.05]}, ("intercepted", 2)),  # the nearest, not the first
+        ({"d1": [0.3, 0.4], "d2": [0.1, 0]}, ("intercepted", 1)),  # at exactly σ, and d1 out of its own radius
+        ({"d2": [0, 0.06], "target": [0, 0.05]}, ("intercepted", 1)),  # before a capture
+        ({"target": [0, 0.05]}, ("captured", None)),
+        ({}, ("timeout", None)),
+    ],
+)
+def test_a_foreign_trajectory_ends_by_the_rule_of_a_run(last, outcome):
+    sc = tadcore.scenarios.load("paper-i1")
+    at = sc.positions + 5.0
+    at[-1] = 0.0
+    for player, place in last.items():
+        at[sc.players.index(player)] = place
+    found = plotting.run_of(sc, [0.0, 1.0], np.array([at, at])).outcome
+    own = {f"{player}.position": place for player, place in zip(sc.players, at.tolist(), strict=True)}
+    assert (found.kind, found.defender) == outcome
+    played = tadcore.simulate(sc.replace(own)).outcome
+    assert outcome[0] == "timeout" or (played.kind, played.defender, played.time) == (*outcome, 0.0)
+
+
 @pytest.mark.parametrize("model", [tadcore.Scenario, tadcore.Attacker, tadcore.Target, tadcore.Defender])
 def test_help_says_what_every_field_is(model):
     for name, field in model.model_fields.items():

@@ -22,8 +22,9 @@ def run_of(sc: ScenarioLike, times: ArrayLike, position: ArrayLike, *, control: 
     """Make of arrays what the figures of a run take: trajectories, distances, controls, networks, animations.
 
     The network at every instant is that of the distances and the scenario's visibility radii, and the end that of the
-    last row: an interception or a capture where somebody is within a capture radius, a timeout elsewhere. There are no
-    gains and no Θ, and their figures show zeros.
+    last row, by the rule of a run: an interception by the nearest defender within its capture radius, or else a capture
+    where the attacker is within its own of the target, or else a timeout. There are no gains and no Θ, and their
+    figures show zeros.
 
     Parameters
     ----------
@@ -75,12 +76,13 @@ def run_of(sc: ScenarioLike, times: ArrayLike, position: ArrayLike, *, control: 
     adjacency[-1] = adjacency[-2]  # no network is formed at the end
     rows, m, size = adjacency.shape
     apart = np.linalg.norm(at[-1, :-1] - at[-1, -1], axis=-1)
-    within = np.flatnonzero(apart <= game.capture_radii)
-    who = int(within[0]) if len(within) else -1
-    kind = OutcomeKind.TIMEOUT if who < 0 else OutcomeKind.CAPTURED if who == game.n else OutcomeKind.INTERCEPTED
+    within = apart <= game.capture_radii
+    nearest = int(np.argmin(np.where(within, apart, np.inf)[: game.n]))
+    kind = OutcomeKind.CAPTURED if within[-1] else OutcomeKind.TIMEOUT
+    kind = OutcomeKind.INTERCEPTED if within[nearest] else kind
     return Sound(
         scenario=game,
-        outcome=Outcome.of(kind, who if kind == OutcomeKind.INTERCEPTED else -1, float(instants[-1])),
+        outcome=Outcome.of(kind, nearest if kind == OutcomeKind.INTERCEPTED else -1, float(instants[-1])),
         diverged=None,
         times=instants,
         position=at,

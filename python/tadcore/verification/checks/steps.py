@@ -114,7 +114,8 @@ def step_study(sc: ScenarioLike, *, halvings: int = 2) -> StepStudy:
     Parameters
     ----------
     sc : Scenario, path or name
-        The scenario; its step is the first.
+        The scenario; its step is the first. With failures or disturbances another step draws others, so the outcomes
+        differ by chance too.
     halvings : int
         How many times the step is halved.
 

@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 
 from tadcore import _core
 from tadcore._shared.arrays import Floats
+from tadcore.errors import ScenarioError
 from tadcore.game.network import Edge, VisibilityNetwork, edges_of
 from tadcore.game.outcome import Outcome, OutcomeKind
 from tadcore.scenario.model import Scenario
@@ -42,7 +43,8 @@ def play_by_events(sc: ScenarioLike) -> EventPlay:
     Parameters
     ----------
     sc : Scenario, path or name
-        The scenario. Its step is the step of the feedback; halve it to see the times converge, at second order.
+        The scenario, without failures, links and disturbances. Its step is the step of the feedback; halve it to see
+        the times converge, at second order.
 
     Returns
     -------
@@ -51,6 +53,8 @@ def play_by_events(sc: ScenarioLike) -> EventPlay:
 
     Raises
     ------
+    ScenarioError
+        The game has failures, links or disturbances.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
 
@@ -61,7 +65,11 @@ def play_by_events(sc: ScenarioLike) -> EventPlay:
     >>> play.outcome.kind, round(play.outcome.time, 3)
     ('intercepted', 1.393)
     """
-    return _Play(as_scenario(sc)).run()
+    sc = as_scenario(sc)
+    if sc.world is not None:
+        rule = "one without failures, links and disturbances in continuous time, where sight alone is followed"
+        raise ScenarioError("scenario", "a game with failures, links or disturbances", rule)
+    return _Play(sc).run()
 
 
 class _Play:

@@ -85,7 +85,7 @@ def sliding_study(sc: ScenarioLike, *, halvings: int = 3) -> SlidingStudy:
     Parameters
     ----------
     sc : Scenario, path or name
-        The scenario; its step is the first.
+        The scenario, without failures, links and disturbances; its step is the first.
     halvings : int
         How many times the step is halved.
 
@@ -96,6 +96,8 @@ def sliding_study(sc: ScenarioLike, *, halvings: int = 3) -> SlidingStudy:
 
     Raises
     ------
+    ScenarioError
+        The game has failures, links or disturbances.
     NoEquilibriumError
         The game has no equilibrium on [0, T].
     """
