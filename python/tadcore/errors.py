@@ -36,6 +36,7 @@ class Missing(enum.Enum):
 
 
 MISSING = Missing.MISSING
+"""What `ScenarioError.value` is where nothing was given."""
 
 
 class TadcoreError(Exception):

@@ -12,7 +12,20 @@ from pathlib import Path
 import pytest
 
 import tadcore
-from tadcore import analysis, plotting, sampling, statistics, verification
+from tadcore import (
+    analysis,
+    errors,
+    game,
+    plotting,
+    report,
+    reproduce,
+    sampling,
+    scenario,
+    simulation,
+    statistics,
+    study,
+    verification,
+)
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGES = sorted(
@@ -20,6 +33,9 @@ PAGES = sorted(
 )
 CELL = re.compile(r"^```\{code-(?:cell|block)\} python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXECUTED = [page for page in PAGES if CELL.search(page.read_text(encoding="utf-8"))]
+
+UNLISTED = {"draw", "manifest", "intervals"}
+"""What is public to other packages of the library alone."""
 
 pytestmark = pytest.mark.usefixtures("agg")
 
@@ -90,7 +106,22 @@ def test_every_public_name_is_in_the_reference():
     for package in (statistics, verification, analysis):
         home = package.__name__.removeprefix("tadcore.")
         assert {f"{home}.{name}" for name in package.__all__ if name not in tadcore.__all__} <= bare
+    last = {name.rpartition(".")[2] for name in named}
+    for package in (errors, game, report, reproduce, scenario, simulation, study):
+        assert {*package.__all__} <= last, package.__name__
     assert "tadcore.__version__" in text
+
+
+def test_every_member_that_is_public_is_in_the_reference():
+    """What a class of results has is listed where the class is, but for what its attributes' section says."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in sorted((DOCS / "api").glob("*.rst")))
+    for kind in (tadcore.Run, tadcore.Batch, tadcore.Gains, tadcore.StudyResult, tadcore.Study, tadcore.SweepResult):
+        found = re.search(rf"^\.\. autoclass:: {kind.__name__}\n   :members: (.*)$", text, flags=re.MULTILINE)
+        listed = set(found[1].split(", ")) if found else set()
+        own = {n for base in kind.__mro__[:-1] for n, v in vars(base).items() if n[0] != "_" and (callable(v) or hasattr(v, "__get__"))}
+        said = set(re.findall(r"^ {4}(\w+(?:, \w+)*) : ", kind.__doc__, flags=re.MULTILINE))
+        said = {name for names in said for name in names.split(", ")}
+        assert own - said <= listed | UNLISTED, (kind.__name__, own - said - listed)
 
 
 def test_every_public_name_of_plotting_is_a_figure_or_is_said():
