@@ -34,7 +34,7 @@ PAGES = sorted(
 CELL = re.compile(r"^```\{code-(?:cell|block)\} python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXECUTED = [page for page in PAGES if CELL.search(page.read_text(encoding="utf-8"))]
 
-UNLISTED = {"draw", "manifest", "intervals"}
+UNLISTED = {"draw", "manifest"}
 """What is public to other packages of the library alone."""
 
 pytestmark = pytest.mark.usefixtures("agg")
@@ -118,7 +118,12 @@ def test_every_member_that_is_public_is_in_the_reference():
     for kind in (tadcore.Run, tadcore.Batch, tadcore.Gains, tadcore.StudyResult, tadcore.Study, tadcore.SweepResult):
         found = re.search(rf"^\.\. autoclass:: {kind.__name__}\n   :members: (.*)$", text, flags=re.MULTILINE)
         listed = set(found[1].split(", ")) if found else set()
-        own = {n for base in kind.__mro__[:-1] for n, v in vars(base).items() if n[0] != "_" and (callable(v) or hasattr(v, "__get__"))}
+        own = {
+            n
+            for base in kind.__mro__[:-1]
+            for n, v in vars(base).items()
+            if n[0] != "_" and (callable(v) or hasattr(v, "__get__"))
+        }
         said = set(re.findall(r"^ {4}(\w+(?:, \w+)*) : ", kind.__doc__, flags=re.MULTILINE))
         said = {name for names in said for name in names.split(", ")}
         assert own - said <= listed | UNLISTED, (kind.__name__, own - said - listed)

@@ -19,7 +19,7 @@
 //! | N, K | [`Equilibrium::size`], [`Equilibrium::steps`] | players relative to the attacker; steps of the grid |
 //! | γ*(t_k, z) | [`Equilibrium::feedback`] | the equilibrium controls, one row of gains per player |
 //!
-//! | room | what it knows |
+//! | module | what it knows |
 //! |---|---|
 //! | `classes` | large teams with equal defenders, as smaller games |
 //! | `coupled`, `large` | I1: the right-hand side for N known to the compiler, and for any N |
