@@ -29,7 +29,7 @@ class Block(NamedTuple):
 
 
 class Sampler(abc.ABC):
-    """What `tadcore.Study` asks of a sampler; ``components`` is dim for a position and 1 for a radius."""
+    """What `tadcore.Study` asks of a sampler; ``components`` is dim for a position and 1 for a number."""
 
     by_points: ClassVar[bool] = True
     """Whether values come from the points alone; otherwise only the random design can use it."""

@@ -45,7 +45,7 @@ def merge_store(folder: str | os.PathLike[str], *, storage_options: Mapping[str,
     """Make one store of the parts that jobs with ``part=(i, n)`` have left in a folder.
 
     Parts that are not there, or not finished, leave trials out; `tadcore.Study.run` with the same store plays these,
-    and parts that come later can be merged later. Rows are moved, not copied.
+    and parts that come later can be merged later. Rows are moved, not copied; at a URL a move is a copy by the service.
 
     Parameters
     ----------
