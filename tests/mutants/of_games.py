@@ -64,17 +64,19 @@ MUTANTS = {
     ],
     "simulation/state.rs": [
         ("z = X − X_a", ".map(|(x, a)| «x - a»)", "x + a"),
+        ("X = z + X_a", ".map(|(x, a)| «x + a»)", "x - a"),
         ("row times z", "«*o += g * x;»", "*o -= g * x;"),
     ],
     "simulation/divergence.rs": [
         ("divergence: the largest distance at the start", "most.max(«squared_distance(a, b)»)", "0.0"),
         ("divergence: the bound", "«DIVERGED * DIVERGED» * scale", "DIVERGED"),
     ],
-    "simulation/record.rs": [
+    "simulation/play.rs": [
         ("attacker by its own row", "for_each(|(x, d)| «*x += d»)", "*x -= d"),
-        ("X = z + X_a", ".map(|(x, a)| «x + a»)", "x - a"),
         ("timeout only at T", "(«k == last»).then_some", "k + 1 == last"),
         ("the network at the start", "if «end.is_none() || k == 0»", "end.is_none()"),
+    ],
+    "simulation/record.rs": [
         (
             "rows that did not converge",
             "«step.gains.status != Status::Converged»",

@@ -9,7 +9,7 @@ use crate::network::{Kind, Topology};
 use crate::random::{Draws, Walk};
 
 /// What asks for memory here.
-const WHAT: &str = "the record of one run";
+pub(super) const WHAT: &str = "the record of one run";
 
 /// An instant, as a network from outside is asked for.
 #[derive(Debug, Clone, Copy)]

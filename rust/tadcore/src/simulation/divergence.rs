@@ -54,6 +54,51 @@ pub fn within(reach: f64, limit: f64) -> bool {
     reach <= limit
 }
 
+/// When a run diverged, and how far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Divergence {
+    /// The grid index of the first instant beyond [`DIVERGED`].
+    pub step: usize,
+    /// The largest distance to the attacker up to the end, over the largest distance between players at the start; where
+    /// the game leaves the range of double precision, a lower bound.
+    pub size: f64,
+}
+
+/// How far from the attacker the players of one run have been so far.
+#[derive(Debug)]
+pub(super) struct Excursion {
+    scale: f64,
+    /// The largest squared distance, [`LAST`] at most.
+    most: f64,
+    since: Option<usize>,
+}
+
+impl Excursion {
+    /// Of a run that starts at the state `z`.
+    pub(super) fn from_start(z: &[f64], dim: usize) -> Self {
+        Self { scale: scale(z, dim), most: 0.0, since: None }
+    }
+
+    /// Notes the state at step k; whether the game can be played on from it.
+    pub(super) fn note(&mut self, k: usize, z: &[f64], dim: usize) -> bool {
+        let far = reach(z, dim);
+        if self.since.is_none() && !within(far, limit(self.scale)) {
+            self.since = Some(k);
+        }
+        let playable = within(far, LAST);
+        self.most = self.most.max(if playable { far } else { LAST });
+        playable
+    }
+
+    pub(super) fn has_diverged(&self) -> bool {
+        self.since.is_some()
+    }
+
+    pub(super) fn divergence(&self) -> Option<Divergence> {
+        self.since.map(|step| Divergence { step, size: (self.most / self.scale).sqrt() })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,33 +1,17 @@
-//! One game, everything recorded.
+//! What one game records, row by row.
 
-use super::course::{Course, Moment, Outside, Present};
-use super::divergence;
-use super::outcome::{Outcome, Reach};
-use super::passes::{Pass, Step, Termination};
-use super::setup::Setup;
-use super::state::{acted_on, apply, relative_state};
-use super::world::Chances;
-use crate::cancel::CancelToken;
-use crate::error::{RunError, Stopped};
+use super::course::{Course, Present, WHAT};
+use super::divergence::Divergence;
+use super::outcome::Outcome;
+use super::passes::Pass;
+use super::state::{acted_on, apply, positions};
+use crate::error::Stopped;
 use crate::game::Grid;
-use crate::game::validation::{BEYOND, rule};
+use crate::game::validation::BEYOND;
 use crate::memory::{MOST_BYTES, append, reserve, spare, within};
-use crate::network::{EdgeRule, EdgeState, Topology, observe, squared_reach};
+use crate::network::Topology;
 use crate::policy::{GainKind, Policy, StepPolicy, closed_loop::FreeRows};
-use crate::synthesis::{Status, Synthesizer};
-
-/// When a run diverged, and how far.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Divergence {
-    /// The grid index of the first instant beyond [`divergence::DIVERGED`].
-    pub step: usize,
-    /// The largest distance to the attacker up to the end, over the largest distance between players at the start; where
-    /// the game leaves the range of double precision, a lower bound.
-    pub size: f64,
-}
-
-/// What asks for memory here.
-const WHAT: &str = "the record of one run";
+use crate::synthesis::Status;
 
 /// A recorded run of L steps: L + 1 rows, the last the terminal state.
 ///
@@ -76,198 +60,42 @@ pub struct Record {
     pub course: Option<Course>,
 }
 
-/// What a run is given besides positions and radii; by default nothing, as in the paper.
-#[derive(Default)]
-pub struct Rules<'a> {
-    /// When edges form and break.
-    pub edges: EdgeRule,
-    /// When the game ends.
-    pub termination: Termination,
-    /// What the gains are made of.
-    pub gains: GainKind,
-    /// A world, and which of its trials.
-    pub chances: Option<Chances<'a>>,
-    /// A network from outside, in the place of what is seen.
-    pub outside: Option<Box<Outside<'a>>>,
-}
-
-/// Runs one game and records everything.
-///
-/// # Errors
-/// [`RunError`] for positions or radii that break a rule, for a game that leaves the range of double precision without
-/// having diverged, or when the caller cancelled.
-pub fn simulate(policy: &Policy, setup: &Setup, cancel: &CancelToken) -> Result<Record, RunError> {
-    simulate_with(policy, setup, Rules::default(), cancel)
-}
-
-/// The same by other rules.
-///
-/// # Errors
-/// [`RunError`] for positions, radii or rules that cannot be accepted, where a network from outside could not be given, or
-/// when the caller cancelled.
-pub fn simulate_with(
-    policy: &Policy,
-    setup: &Setup,
-    mut rules: Rules,
-    cancel: &CancelToken,
-) -> Result<Record, RunError> {
-    setup.check(policy.game())?;
-    let kind = rules.gains;
-    let words = "2: gains turn in the plane alone";
-    rule("dim", setup.dim as f64, kind == GainKind::Scalar || setup.dim == 2, words)?;
-    rules.edges.check()?;
-    if let (Some(chances), Termination::Continuous) = (&rules.chances, rules.termination) {
-        chances.world.refuse_between()?;
-    }
-    let mut present = rules.chances.map(|chances| Present::new(&chances, policy.game(), setup.dim)).transpose()?;
-    spare(WHAT)?;
-    let game = policy.game();
-    let (n, size, m, dim) = (game.n(), game.size(), game.constrained(), setup.dim);
-    let reach = Reach::new(setup.capture);
-    let sight: Vec<f64> = setup.visibility.iter().map(|&zeta| squared_reach(zeta)).collect();
-    let mut z = Vec::with_capacity(size * dim);
-    relative_state(setup.positions, dim, &mut z);
-    let mut attacker = setup.positions[(n + 1) * dim..].to_vec();
-    // The network in force, what is seen of it, and the sight.
-    let mut topology = Topology::empty(m, size);
-    let (mut seen, mut within_sight) = (topology.clone(), topology.clone());
-    let mut edges = (rules.edges != EdgeRule::PAPER)
-        .then(|| EdgeState::new(&rules.edges, setup.visibility, size, game.grid().step()));
-    let mut solver = Synthesizer::new();
-    let mut record = Record {
-        outcome: Outcome::Timeout,
-        steps: 0,
-        after: 0.0,
-        passes: Vec::new(),
-        end: 0,
-        diverged: None,
-        dim,
-        positions: Vec::new(),
-        controls: Vec::new(),
-        networks: Vec::new(),
-        kind,
-        gains: Vec::new(),
-        turn: Vec::new(),
-        theta: Vec::new(),
-        terms: Vec::new(),
-        iterations: 0,
-        unconverged: 0,
-        certified: 0,
-        course: (present.is_some() || rules.outside.is_some()).then(Course::default),
-    };
-    let last = game.grid().steps();
-    let mut next = vec![0.0; size * dim];
-    let scale = divergence::scale(&z, dim);
-    let (limit, mut most, mut recording) = (divergence::limit(scale), 0.0, true);
-    for k in 0..=last {
-        cancel.check()?;
-        let far = divergence::reach(&z, dim);
-        if record.diverged.is_none() && !divergence::within(far, limit) {
-            record.diverged = Some(Divergence { step: k, size: 0.0 });
-        }
-        most = f64::max(most, if divergence::within(far, divergence::LAST) { far } else { divergence::LAST });
-        if k > 0 && !divergence::within(far, divergence::LAST) {
-            // Nobody is caught any more, and the numbers end.
-            record.end = last;
-            break;
-        }
-        let end = reach.ends(&z, dim).or((k == last).then_some(Outcome::Timeout));
-        if end.is_none() || k == 0 {
-            match &mut edges {
-                None => observe(&z, dim, &sight, &mut within_sight),
-                Some(edges) => edges.observe(k, &z, dim, &sight, &mut within_sight),
-            }
-            seen.clone_from(&within_sight);
-            topology = match &mut present {
-                None => seen.clone(),
-                Some(present) => present.network(k, &z, &mut seen),
-            };
-            if let Some(outside) = &mut rules.outside {
-                let (time, positions) = (game.grid().time(k), positions(&z, &attacker, dim));
-                let given = outside(&Moment { step: k, time, positions: &positions, seen: &seen });
-                topology = given.ok_or(RunError::Network { time })?;
-            }
-        }
-        let step = policy.answer(kind, k, &topology, &mut solver, cancel)?;
-        if recording {
-            record.push(policy, k, &z, &attacker, &topology, &step)?;
-            if let Some(course) = &mut record.course {
-                course.push(&seen, present.as_ref())?;
-            }
-            recording = record.last_row_is_bounded(n + 2);
-            if recording {
-                record.count(&step);
-                record.steps = k;
-            } else if record.diverged.is_some() && k > 0 {
-                record.pop(n + 2);
-            } else {
-                return Err(RunError::Range { time: game.grid().time(k) });
-            }
-        }
-        if let Some(outcome) = end {
-            (record.outcome, record.end) = (outcome, k);
-            break;
-        }
-        let before = (rules.termination == Termination::Continuous).then(|| attacker.clone());
-        // Scalar rows act on the first of it, z alone.
-        let from = acted_on(&z, kind);
-        advance(&step, &from, dim, &mut next, &mut attacker);
-        let (gains, to) = (step.feedback(size), acted_on(&next, kind));
-        let width = dim * gains.len() / m;
-        let within = Step { k, gains: &gains, start: &from[..width], end: &to[..width], dim };
-        match before {
-            None if record.diverged.is_some() => {} // a pass says nothing any more
-            None if present.as_ref().is_some_and(Present::shakes) => {}
-            None => within.passes(policy, &reach, &mut record.passes, cancel)?,
-            Some(from) => {
-                if let Some((row, after, mut z, moved)) = within.end(policy, &reach, cancel)? {
-                    z.truncate(size * dim);
-                    let attacker: Vec<f64> = from.iter().zip(moved).map(|(x, d)| x + d).collect();
-                    if recording {
-                        record.push(policy, k, &z, &attacker, &topology, &step)?;
-                        if let Some(course) = &mut record.course {
-                            course.push(&seen, present.as_ref())?;
-                        }
-                        record.certified += usize::from(step.gains.certified);
-                        record.steps = k + 1;
-                    }
-                    (record.outcome, record.after, record.end) = (Pass::outcome(row, n), after, k);
-                    break;
-                }
-            }
-        }
-        std::mem::swap(&mut z, &mut next);
-        if let Some(present) = &mut present {
-            let added = present.shake(k, &mut z, &mut attacker);
-            if let (true, Some(course)) = (recording, &mut record.course) {
-                course.note(added);
-            }
-        }
-    }
-    if let Some(diverged) = &mut record.diverged {
-        diverged.size = (most / scale).sqrt();
-    }
-    Ok(record)
-}
-
-/// X from z and X_a.
-fn positions(z: &[f64], attacker: &[f64], dim: usize) -> Vec<f64> {
-    let players = z.chunks_exact(dim).flat_map(|row| row.iter().zip(attacker).map(|(x, a)| x + a));
-    players.chain(attacker.iter().copied()).collect()
-}
-
-/// z ← exp(Cδ) z, and the attacker by its own row.
-fn advance(step: &StepPolicy, z: &[f64], dim: usize, next: &mut [f64], attacker: &mut [f64]) {
-    let size = step.attacker.len();
-    for (row, out) in step.transition.chunks_exact(size).zip(next.chunks_exact_mut(dim)) {
-        apply(row, z, dim, out);
-    }
-    let mut moved = vec![0.0; dim];
-    apply(&step.attacker, z, dim, &mut moved);
-    attacker.iter_mut().zip(moved).for_each(|(x, d)| *x += d);
+/// What one row records.
+pub(super) struct Row<'a> {
+    pub(super) z: &'a [f64],
+    pub(super) attacker: &'a [f64],
+    pub(super) step: &'a StepPolicy,
+    pub(super) network: &'a Topology,
+    pub(super) seen: &'a Topology,
+    pub(super) present: Option<&'a Present>,
 }
 
 impl Record {
+    /// A record without rows.
+    pub(super) fn empty(dim: usize, kind: GainKind, course: Option<Course>) -> Self {
+        Self {
+            outcome: Outcome::Timeout,
+            steps: 0,
+            after: 0.0,
+            passes: Vec::new(),
+            end: 0,
+            diverged: None,
+            dim,
+            positions: Vec::new(),
+            controls: Vec::new(),
+            networks: Vec::new(),
+            kind,
+            gains: Vec::new(),
+            turn: Vec::new(),
+            theta: Vec::new(),
+            terms: Vec::new(),
+            iterations: 0,
+            unconverged: 0,
+            certified: 0,
+            course,
+        }
+    }
+
     /// The grid index of the end, or of the instant before it.
     #[must_use]
     pub fn grid_index(&self) -> usize {
@@ -286,21 +114,19 @@ impl Record {
         if self.after > 0.0 && i == self.end + 1 { self.time(grid) } else { grid.time(i) }
     }
 
-    fn last_row_is_bounded(&self, players: usize) -> bool {
-        let row = players * self.dim;
+    /// Whether the numbers of the last row are in the range of double precision.
+    pub(super) fn last_row_is_bounded(&self) -> bool {
+        let row = self.positions.len() / self.networks.len();
         let tails = [&self.positions, &self.controls].map(|all| &all[all.len() - row..]);
         tails.into_iter().flatten().all(|x| x.abs() <= BEYOND) && self.theta.last().is_some_and(|x| x.is_finite())
     }
 
     /// Takes the last row back.
-    fn pop(&mut self, players: usize) {
-        let row = players * self.dim;
-        let (terms, gains) = (self.terms.len() / self.networks.len(), self.gains.len() / self.networks.len());
-        for (all, width) in [(&mut self.positions, row), (&mut self.controls, row), (&mut self.terms, terms)] {
-            all.truncate(all.len() - width);
+    pub(super) fn pop(&mut self) {
+        let (rows, row) = (self.networks.len(), self.positions.len() / self.networks.len());
+        for list in [&mut self.positions, &mut self.controls, &mut self.terms, &mut self.gains, &mut self.turn] {
+            list.truncate(list.len() - list.len() / rows);
         }
-        self.gains.truncate(self.gains.len() - gains);
-        self.turn.truncate(self.gains.len());
         self.networks.pop();
         self.theta.pop();
         if let Some(course) = &mut self.course {
@@ -318,38 +144,31 @@ impl Record {
         rows as u128 * (8 * numbers + m * n / 8 + size_of::<Topology>() as u128 + course)
     }
 
-    fn push(
-        &mut self,
-        policy: &Policy,
-        k: usize,
-        z: &[f64],
-        attacker: &[f64],
-        network: &Topology,
-        step: &StepPolicy,
-    ) -> Result<(), Stopped> {
-        let dim = self.dim;
+    /// Adds a row, under the feedback of t_k.
+    pub(super) fn push(&mut self, policy: &Policy, k: usize, row: &Row) -> Result<(), Stopped> {
+        let (dim, step) = (self.dim, row.step);
         within(WHAT, self.bytes(policy, k + 1, dim), MOST_BYTES)?;
         if k.is_multiple_of(64) {
             spare(WHAT)?;
         }
         for list in [&mut self.positions, &mut self.controls] {
-            reserve(WHAT, list, z.len() + dim)?;
+            reserve(WHAT, list, row.z.len() + dim)?;
         }
         for list in [&mut self.theta, &mut self.terms] {
             reserve(WHAT, list, 4)?;
         }
         reserve(WHAT, &mut self.networks, 1)?;
-        self.positions.extend(positions(z, attacker, dim));
+        self.positions.extend(positions(row.z, row.attacker));
         let FreeRows { attacker: h, target } = policy.free_rows(k);
         let mut velocity = vec![0.0; dim];
-        let (state, feedback) = (acted_on(z, self.kind), step.feedback(network.size()));
-        let gains = feedback.chunks_exact(feedback.len() / network.rows());
-        for row in gains.chain(target.as_deref()).chain(std::iter::once(&h[..])) {
-            apply(row, &state, dim, &mut velocity);
+        let (state, feedback) = (acted_on(row.z, self.kind), step.feedback(row.network.size()));
+        let gains = feedback.chunks_exact(feedback.len() / row.network.rows());
+        for gain in gains.chain(target.as_deref()).chain(std::iter::once(&h[..])) {
+            apply(gain, &state, dim, &mut velocity);
             self.controls.extend_from_slice(&velocity);
         }
         self.terms.extend_from_slice(&step.terms);
-        self.networks.push(network.clone());
+        self.networks.push(row.network.clone());
         append(WHAT, &mut self.gains, &step.gains.rows)?;
         if self.kind != GainKind::Scalar {
             let mirror = self.kind == GainKind::Mirror;
@@ -358,10 +177,14 @@ impl Record {
             self.turn.resize(self.gains.len(), 0.0);
         }
         self.theta.push(step.gains.theta);
+        if let Some(course) = &mut self.course {
+            course.push(row.seen, row.present)?;
+        }
         Ok(())
     }
 
-    fn count(&mut self, step: &StepPolicy) {
+    /// Counts how the gains of a row were found.
+    pub(super) fn count(&mut self, step: &StepPolicy) {
         self.iterations += step.gains.iterations;
         self.unconverged += usize::from(step.gains.status != Status::Converged);
         self.certified += usize::from(step.gains.certified);

@@ -1,4 +1,4 @@
-//! The state z as rows: made from positions, and multiplied by a row of gains or of a transition.
+//! The state z as rows: made from positions and turned into them, and multiplied by a row of gains or of a transition.
 
 use std::borrow::Cow;
 
@@ -9,6 +9,12 @@ pub fn relative_state(positions: &[f64], dim: usize, z: &mut Vec<f64>) {
     let (players, attacker) = positions.split_at(positions.len() - dim);
     z.clear();
     z.extend(players.chunks_exact(dim).flat_map(|row| row.iter().zip(attacker).map(|(x, a)| x - a)));
+}
+
+/// X from z and X_a, the inverse of [`relative_state`].
+pub(super) fn positions<'a>(z: &'a [f64], attacker: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    let players = z.chunks_exact(attacker.len()).flat_map(move |row| row.iter().zip(attacker).map(|(x, a)| x + a));
+    players.chain(attacker.iter().copied())
 }
 
 /// What the rows of gains of some kind act on: z, beside it Jz for gains that turn, −Jz for their mirror images; J is a
