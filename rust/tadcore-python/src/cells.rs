@@ -6,11 +6,11 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use tadcore::cells::{Leaf, Map, Region, Verdict};
 use tadcore::policy::Policy;
-use tadcore::simulation::Setup;
 
-use super::arrays::{copied, entries};
+use super::arrays::entries;
 use super::game::Game;
 use super::guard::guarded;
+use super::inputs::Starts;
 use super::stop::Stop;
 use super::{detach, errors};
 
@@ -57,12 +57,9 @@ impl Cells {
         budget: usize,
     ) -> PyResult<Self> {
         guarded(|| {
-            let dim = positions.as_array().ncols();
-            let positions = copied(py, &positions)?;
-            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
             let policy = game.policy(py)?;
-            let setup = Setup { dim, positions: &positions, visibility: &visibility, capture: &capture };
-            let region = Region { setup, player, low, high };
+            let region = Region { setup: starts.setup(), player, low, high };
             let map = Map::new(&policy, &region, resolution, budget)
                 .map_err(|error| errors::run(py, policy.game(), error))?;
             Ok(Self { policy, map: Mutex::new(map) })

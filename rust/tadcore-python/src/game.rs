@@ -7,23 +7,24 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyAr
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use tadcore::ensemble::{self, Batch, Between, Lineages};
-use tadcore::game::{Criterion, Game as CoreGame, Grid, Interaction, Weights};
+use tadcore::ensemble::{self, Between, End, Lineages};
+use tadcore::game::{Game as CoreGame, Grid, Weights};
 use tadcore::network::{EdgeRule, Topology};
 use tadcore::policy::{DEFAULT_TABLE_BYTES, GainKind, Policy};
-use tadcore::simulation::{self, Chances, Rules, Setup, Termination};
-use tadcore::synthesis::{Method, Options, Synthesizer};
+use tadcore::simulation::{self, Chances, Rules};
+use tadcore::synthesis::Synthesizer;
 
-use super::arrays::{copied, entries, shaped};
+use super::arrays::{entries, shaped};
 use super::equilibrium::Equilibrium;
 use super::gains::Gains;
 use super::generation::Generation;
 use super::guard::guarded;
+use super::inputs::{Starts, numbers};
 use super::outside::Outside;
 use super::record::Record;
 use super::stop::Stop;
 use super::world::World;
-use super::{detach, errors};
+use super::{detach, errors, inputs};
 
 /// Weights, horizon and grid; owns the equilibrium and the (step, topology) table.
 #[pyclass(frozen, module = "tadcore._core")]
@@ -33,22 +34,8 @@ pub(crate) struct Game {
     generation: Generation,
 }
 
-fn numbers(array: Option<PyReadonlyArray1<'_, f64>>) -> Vec<f64> {
-    array.map(|a| a.as_array().iter().copied().collect()).unwrap_or_default()
-}
-
-pub(crate) fn termination(continuous: bool) -> Termination {
-    if continuous { Termination::Continuous } else { Termination::Sampled }
-}
-
-fn gain_kind(gains: &str) -> PyResult<GainKind> {
-    match gains {
-        "scalar" => Ok(GainKind::Scalar),
-        "turning" => Ok(GainKind::Turning),
-        "mirror" => Ok(GainKind::Mirror),
-        other => Err(PyValueError::new_err(format!("gains is {other:?}; it must be scalar, turning or mirror"))),
-    }
-}
+type Ends<'py> =
+    (Bound<'py, PyArray1<i8>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
 
 impl Game {
     /// The policy, solving the equilibrium on first use. An error is found again, not kept: it is cheap to find.
@@ -58,6 +45,17 @@ impl Game {
         }
         detach::interruptible(py, |cancel| self.generation.solve(&self.game, self.table_bytes, cancel))?
             .map_err(|error| errors::equilibrium(py, &self.game, &error))
+    }
+
+    /// How runs ended, as columns: kind, defender, time, whether the game diverged.
+    fn ends<'py>(&self, py: Python<'py>, ends: &[End]) -> PyResult<Ends<'py>> {
+        let grid = self.game.grid();
+        Ok((
+            entries(py, ends.len(), |i| ends[i].outcome.code())?,
+            entries(py, ends.len(), |i| ends[i].outcome.defender())?,
+            entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
+            entries(py, ends.len(), |i| ends[i].diverged)?,
+        ))
     }
 }
 
@@ -94,36 +92,22 @@ impl Game {
         table_bytes: Option<usize>,
     ) -> PyResult<Self> {
         guarded(|| {
-            let interaction = match interaction {
-                "I1" => Interaction::I1,
-                "I2" => Interaction::I2,
-                other => {
-                    return Err(PyValueError::new_err(format!("interaction is {other:?}, but it must be I1 or I2")));
-                }
-            };
+            let (interaction, criterion) = (inputs::interaction(interaction)?, inputs::criterion(criterion)?);
+            let optional = |array: Option<PyReadonlyArray1<'_, f64>>| array.as_ref().map(numbers).unwrap_or_default();
             let weights = Weights {
-                r_d: numbers(Some(defender_control_weight)),
+                r_d: numbers(&defender_control_weight),
                 r_tau: target_control_weight,
                 r_a: attacker_control_weight,
-                q_da: numbers(defender_running_weight),
-                f_da: numbers(defender_terminal_weight),
-                q_ad: numbers(Some(evasion_running_weight)),
-                f_ad: numbers(Some(evasion_terminal_weight)),
+                q_da: optional(defender_running_weight),
+                f_da: optional(defender_terminal_weight),
+                q_ad: numbers(&evasion_running_weight),
+                f_ad: numbers(&evasion_terminal_weight),
                 q_atau: attacker_target_running_weight,
                 f_atau: attacker_target_terminal_weight,
                 q_taua: target_running_weight,
                 f_taua: target_terminal_weight,
                 lambda: evasion,
-                gamma: numbers(Some(synthesis_weights)),
-            };
-            let criterion = match criterion {
-                "paper" => Criterion::Paper,
-                "component" => Criterion::Component,
-                other => {
-                    return Err(PyValueError::new_err(format!(
-                        "criterion is {other:?}, but it must be paper or component"
-                    )));
-                }
+                gamma: numbers(&synthesis_weights),
             };
             let game = Grid::new(horizon, step)
                 .and_then(|grid| CoreGame::new(interaction, weights, grid))
@@ -181,20 +165,9 @@ impl Game {
                     self.game.grid().steps()
                 )));
             }
-            let mut options = match method {
-                "newton" => max_iterations.map(|_| Options::default()),
-                "restarts" => Some(Options::default()),
-                "descent" => Some(Options::new(Method::Descent)),
-                other => {
-                    let rule = "it must be newton, restarts or descent";
-                    return Err(PyValueError::new_err(format!("method is {other:?}; {rule}")));
-                }
-            };
-            if let (Some(options), Some(limit)) = (&mut options, max_iterations) {
-                options.max_iterations = limit;
-            }
-            let topology = Topology::from_fn(m, n, |i, j| seen[(i, j)]);
-            let (kind, policy) = (gain_kind(gains)?, self.policy(py)?);
+            let options = inputs::options(method, max_iterations)?;
+            let topology = inputs::topology(seen);
+            let (kind, policy) = (inputs::gain_kind(gains)?, self.policy(py)?);
             if kind != GainKind::Scalar && options.is_some() {
                 return Err(PyValueError::new_err(format!(
                     "gains is {gains:?}; method must be newton, without a limit"
@@ -234,8 +207,7 @@ impl Game {
                     steps.len()
                 )));
             }
-            let networks: Vec<Topology> =
-                seen.axis_iter(Axis(0)).map(|seen| Topology::from_fn(m, n, |i, j| seen[(i, j)])).collect();
+            let networks: Vec<Topology> = seen.axis_iter(Axis(0)).map(inputs::topology).collect();
             let policy = self.policy(py)?;
             let prices = detach::interruptible(py, |cancel| {
                 let mut solver = Synthesizer::new();
@@ -268,22 +240,19 @@ impl Game {
         gains: &str,
     ) -> PyResult<Record> {
         guarded(|| {
-            let dim = positions.as_array().ncols();
-            let flat = copied(py, &positions)?;
-            let (visibility, capture) = (numbers(Some(visibility_radii)), numbers(Some(capture_radii)));
-            let (kind, policy) = (gain_kind(gains)?, self.policy(py)?);
+            let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
+            let (kind, policy) = (inputs::gain_kind(gains)?, self.policy(py)?);
             let world = world.map(|world| world.get().core());
-            let outside = network.map(|function| Outside::new(function, &self.game, dim));
+            let outside = network.map(|function| Outside::new(function, &self.game, starts.setup().dim));
             let record = detach::interruptible(py, |cancel| {
-                let setup = Setup { dim, positions: &flat, visibility: &visibility, capture: &capture };
                 let rules = Rules {
                     edges: EdgeRule { hysteresis, dwell },
-                    termination: termination(continuous),
+                    termination: inputs::termination(continuous),
                     gains: kind,
                     chances: world.map(|world| Chances { world, seed, trial }),
                     outside: outside.as_ref().map(Outside::network),
                 };
-                simulation::simulate_with(&policy, &setup, rules, cancel)
+                simulation::simulate_with(&policy, &starts.setup(), rules, cancel)
             })?;
             let failed = outside.and_then(Outside::error);
             let record = record.map_err(|error| failed.unwrap_or_else(|| errors::run(py, &self.game, error)))?;
@@ -317,27 +286,18 @@ impl Game {
         Bound<'py, PyArray1<bool>>,
     )> {
         guarded(|| {
-            let dim = positions.as_array().dim().2;
-            let positions = copied(py, &positions)?;
-            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
             let policy = self.policy(py)?;
             let world = world.map(|world| world.get().core());
             let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
             let ends = detach::stoppable(py, token, |cancel| {
-                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
-                let between = Between { termination: termination(continuous), passes };
+                let between = Between { termination: inputs::termination(continuous), passes };
                 let chances = world.map(|world| Chances { world, seed, trial: first_trial });
-                ensemble::run_with(&policy, &batch, between, chances, threads, cancel)
+                ensemble::run_with(&policy, &starts.batch(), between, chances, threads, cancel)
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
-            let grid = self.game.grid();
-            Ok((
-                entries(py, ends.len(), |i| ends[i].outcome.code())?,
-                entries(py, ends.len(), |i| ends[i].outcome.defender())?,
-                entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
-                entries(py, ends.len(), |i| ends[i].diverged)?,
-                entries(py, ends.len(), |i| ends[i].passed)?,
-            ))
+            let (kind, defender, time, diverged) = self.ends(py, &ends)?;
+            Ok((kind, defender, time, diverged, entries(py, ends.len(), |i| ends[i].passed)?))
         })
     }
 
@@ -366,26 +326,18 @@ impl Game {
         Bound<'py, PyArray2<f64>>,
     )> {
         guarded(|| {
-            let dim = positions.as_array().dim().2;
-            let positions = copied(py, &positions)?;
-            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
             let policy = self.policy(py)?;
             let world = world.map(|world| world.get().core());
             let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
             let (ends, scores) = detach::stoppable(py, token, |cancel| {
-                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
                 let chances = world.map(|world| Chances { world, seed, trial: first_trial });
-                ensemble::run_scored(&policy, &batch, chances, threads, cancel)
+                ensemble::run_scored(&policy, &starts.batch(), chances, threads, cancel)
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
-            let grid = self.game.grid();
-            Ok((
-                entries(py, ends.len(), |i| ends[i].outcome.code())?,
-                entries(py, ends.len(), |i| ends[i].outcome.defender())?,
-                entries(py, ends.len(), |i| grid.time_after(ends[i].step, ends[i].after))?,
-                entries(py, ends.len(), |i| ends[i].diverged)?,
-                shaped(py, &scores, [ends.len(), ensemble::columns(self.game.n())])?,
-            ))
+            let (kind, defender, time, diverged) = self.ends(py, &ends)?;
+            let scores = shaped(py, &scores, [ends.len(), ensemble::columns(self.game.n())])?;
+            Ok((kind, defender, time, diverged, scores))
         })
     }
 
@@ -411,9 +363,7 @@ impl Game {
         threads: Option<usize>,
     ) -> PyResult<(Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<f64>>)> {
         guarded(|| {
-            let dim = positions.as_array().dim().2;
-            let positions = copied(py, &positions)?;
-            let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+            let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
             let whole = |array: &PyReadonlyArray1<'py, u64>| -> Vec<usize> {
                 array.as_array().iter().map(|&x| usize::try_from(x).unwrap_or(usize::MAX)).collect()
             };
@@ -422,10 +372,9 @@ impl Game {
             let policy = self.policy(py)?;
             let world = world.get().core();
             let (ends, courses) = detach::interruptible(py, |cancel| {
-                let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
                 let lineages = Lineages { offsets: &offsets, steps: &steps, trials: &trials };
                 let chances = Chances { world, seed, trial: 0 };
-                ensemble::run_courses(&policy, &batch, chances, lineages, column, threads, cancel)
+                ensemble::run_courses(&policy, &starts.batch(), chances, lineages, column, threads, cancel)
             })?
             .map_err(|error| errors::run(py, &self.game, error))?;
             let instants = self.game.grid().steps() + 1;

@@ -3,16 +3,16 @@
 use numpy::{PyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use tadcore::ensemble::Between;
 use tadcore::ensemble::games::{GameEnd, run_games};
-use tadcore::ensemble::{Batch, Between};
 use tadcore::error::GameError;
 use tadcore::game::{Game, Grid, Interaction, Weights};
 
 use super::arrays::{copied, entries};
-use super::game::termination;
 use super::guard::guarded;
+use super::inputs::Starts;
 use super::stop::Stop;
-use super::{detach, errors};
+use super::{detach, errors, inputs};
 
 /// The code of a game without an equilibrium, after those of outcomes.
 const NO_EQUILIBRIUM: i8 = 3;
@@ -70,14 +70,10 @@ pub(crate) fn simulate_games<'py>(
     Bound<'py, PyArray1<bool>>,
 )> {
     guarded(|| {
-        let (interaction, terms) = match interaction {
-            "I1" => (Interaction::I1, 4),
-            "I2" => (Interaction::I2, 3),
-            other => return Err(PyValueError::new_err(format!("interaction is {other:?}, but it must be I1 or I2"))),
-        };
-        let (trials, players, dim) = positions.as_array().dim();
+        let interaction = inputs::interaction(interaction)?;
+        let (trials, players, _) = positions.as_array().dim();
         let n = players.saturating_sub(2);
-        let width = 9 + 5 * n + terms;
+        let width = 9 + 5 * n + interaction.terms();
         if numbers.as_array().dim() != (trials, width) {
             return Err(PyValueError::new_err(format!("numbers must have the shape ({trials}, {width})")));
         }
@@ -87,13 +83,11 @@ pub(crate) fn simulate_games<'py>(
             .map(|row| game(interaction, n, row))
             .collect::<Result<_, _>>()
             .map_err(|error| errors::game(py, error))?;
-        let positions = copied(py, &positions)?;
-        let (visibility, capture) = (copied(py, &visibility_radii)?, copied(py, &capture_radii)?);
+        let starts = Starts::copied(py, &positions, &visibility_radii, &capture_radii)?;
         let token = stop.map(|stop| stop.token.clone()).unwrap_or_default();
         let ends = detach::stoppable(py, token, |cancel| {
-            let batch = Batch { dim, positions: &positions, visibility: &visibility, capture: &capture };
-            let between = Between { termination: termination(continuous), passes };
-            run_games(&games, &batch, between, threads, cancel)
+            let between = Between { termination: inputs::termination(continuous), passes };
+            run_games(&games, &starts.batch(), between, threads, cancel)
         })?;
         let ends = match (ends, games.first()) {
             (Ok(ends), _) => ends,

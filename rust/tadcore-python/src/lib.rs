@@ -12,6 +12,7 @@ mod game;
 mod games;
 mod generation;
 mod guard;
+mod inputs;
 mod outside;
 mod record;
 mod stop;

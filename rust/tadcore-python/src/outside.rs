@@ -10,6 +10,7 @@ use tadcore::simulation::{self, Moment};
 
 use super::arrays::{entries, shaped};
 use super::errors;
+use super::inputs::topology;
 
 /// A function (k, t, positions, seen) → adjacency, and how it failed.
 pub(crate) struct Outside {
@@ -53,10 +54,7 @@ impl Outside {
             let _ = error.value(py).call_method1("add_note", (note,));
         })?;
         match answer.extract::<PyReadonlyArray2<'_, bool>>(py) {
-            Ok(network) if network.shape() == [m, n] => {
-                let network = network.as_array();
-                Ok(Topology::from_fn(m, n, |i, j| network[(i, j)]))
-            }
+            Ok(network) if network.shape() == [m, n] => Ok(topology(network.as_array())),
             _ => {
                 let told = |name: &str| answer.getattr(py, name).ok().map(|value| value.to_string());
                 let found = match (told("shape"), told("dtype")) {

@@ -9,6 +9,7 @@ use tadcore::simulation::{Communication, World as CoreWorld};
 
 use super::errors;
 use super::guard::guarded;
+use super::inputs::numbers;
 
 /// What may fail, who talks and who is shaken; checked.
 #[pyclass(frozen, module = "tadcore._core")]
@@ -20,10 +21,6 @@ impl World {
     pub(crate) fn core(&self) -> &CoreWorld {
         &self.world
     }
-}
-
-fn numbers(array: &PyReadonlyArray1<'_, f64>) -> Vec<f64> {
-    array.as_array().iter().copied().collect()
 }
 
 fn begin(stationary: bool) -> Begin {
