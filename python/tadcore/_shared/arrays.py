@@ -1,4 +1,4 @@
-"""Arrays from outside: checked as a whole, refused with the index of the first bad entry of each kind."""
+"""Arrays and numbers from outside, checked; of an array the first bad entries are refused by their index."""
 
 from __future__ import annotations
 
@@ -123,6 +123,21 @@ def as_index(field: str, value: Any, most: int, *, least: int = 0) -> int:
     if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
         return int(value)
     raise ScenarioError(field, value, f"a whole number in [{least}, {most}]")
+
+
+def as_threads(threads: Any) -> int | None:
+    """A number of threads; None for as many as there are cores."""
+    return None if threads is None else as_index("threads", threads, 2**16, least=1)
+
+
+def as_seed(seed: Any) -> int:
+    """A seed of the generators: it is one word of their key."""
+    return as_index("seed", seed, 2**64 - 1)
+
+
+def as_trial(field: str, trial: Any) -> int:
+    """The number of a trial: it shares a word of the counter with the purpose of a draw."""
+    return as_index(field, trial, 2**56 - 1)
 
 
 def as_flag(field: str, value: Any) -> bool:

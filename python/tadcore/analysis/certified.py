@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.arrays import Floats, as_index, as_threads
 from tadcore._shared.calls import public
 from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
@@ -120,7 +120,7 @@ class Proving:
         low, high = np.transpose([_range("x", x), _range("y", y)]).tolist()
         longer = max(high[0] - low[0], high[1] - low[1])
         self._least = longer / _FINE if resolution is None else _positive("resolution", resolution)
-        self._threads = None if threads is None else as_index("threads", threads, 2**16, least=1)
+        self._threads = as_threads(threads)
         self._cells = _core.Cells(
             game_of(sc),
             sc.positions,

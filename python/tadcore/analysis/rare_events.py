@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.arrays import Floats, as_threads
 from tadcore._shared.calls import public
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
@@ -95,8 +95,7 @@ def rare(
         raise ScenarioError("study", study, "a tadcore.Study")
     sc = study.scenario
     event = one_of("event", event, outcome_names(sc.n))
-    aim, sure = _fraction("error", error), as_level(level)
-    workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
+    aim, sure, workers = _fraction("error", error), as_level(level), as_threads(threads)
     if study.termination != "sampled":
         rule = '"sampled" for rare events: scores compare distances at the instants of the grid'
         raise ScenarioError("termination", study.termination, rule)

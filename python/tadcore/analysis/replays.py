@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import Floats, as_positions, as_real, refuse_where
+from tadcore._shared.arrays import Floats, as_positions, as_real, as_seed, refuse_where
 from tadcore._shared.limits import OF_FIELD
 from tadcore.errors import MISSING, ScenarioError
 from tadcore.scenario.model import Scenario
@@ -17,7 +17,6 @@ from tadcore.scenario.paths import label
 from tadcore.scenario.quantities import component
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import Batch, simulate_batch
-from tadcore.simulation.hooks import as_seed
 from tadcore.simulation.starts import Rows, rows_of
 from tadcore.simulation.termination import Termination
 from tadcore.statistics import TrialOutcomes

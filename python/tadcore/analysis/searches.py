@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats, as_index
+from tadcore._shared.arrays import Floats, as_seed
 from tadcore._shared.progress import bar
 from tadcore.errors import ScenarioError
 from tadcore.statistics import difference_interval, proportion_interval
@@ -37,7 +37,7 @@ def fresh_study(study: Study, seed: int | None, *, progress: bool) -> Study:
     """The study of the fresh trials; its draws and those of the search are checked before anything is played."""
     if not isinstance(study, Study):
         raise ScenarioError("study", study, "a tadcore.Study: fresh trials are drawn from it")
-    fresh = (study.seed + 1) % 2**64 if seed is None else as_index("seed", seed, 2**64 - 1)
+    fresh = (study.seed + 1) % 2**64 if seed is None else as_seed(seed)
     if fresh == study.seed:
         raise ScenarioError("seed", seed, "another than the study's own: the fresh trials must be new")
     again = study.replace(seed=fresh)

@@ -9,13 +9,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from tadcore._shared.arrays import Floats
+from tadcore._shared.arrays import Floats, as_trial
 from tadcore.errors import ScenarioError, TadcoreError
 from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
 from tadcore.scenario.model import Scenario
-from tadcore.simulation.hooks import as_trial
 from tadcore.simulation.play import simulate
 
 MOST_POINTS = 400

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tadcore._shared.arrays import Floats, as_flag, as_index, as_positions
+from tadcore._shared.arrays import Floats, as_flag, as_positions, as_seed, as_threads, as_trial
 from tadcore._shared.calls import public
 from tadcore._shared.html import as_html
 from tadcore._shared.progress import pieces
@@ -17,7 +17,6 @@ from tadcore.game.compiled import core_world, game_of
 from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .hooks import as_seed, as_trial
 from .rules import capture_rows, compare, refuse_between, visibility_rows
 from .termination import Termination, as_termination
 
@@ -187,7 +186,7 @@ def simulate_batch(
     compare(starts, capture, sight, sc)
     key, first = as_seed(seed), as_trial("first_trial", first_trial)
     as_trial("first_trial", first + max(len(starts) - 1, 0))
-    workers = None if threads is None else as_index("threads", threads, 2**16, least=1)
+    workers = as_threads(threads)
     ending, looking = as_termination(termination), as_flag("passes", passes)
     game = game_of(sc)
     refuse_between(sc, ending, passes=looking)

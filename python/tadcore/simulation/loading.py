@@ -10,14 +10,13 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from tadcore._shared.arrays import complex_of
+from tadcore._shared.arrays import as_seed, as_trial, complex_of
 from tadcore._shared.files import as_path, strange
 from tadcore.errors import ScenarioError
 from tadcore.game.course import ARRAYS, Course, shapes as course_shapes
 from tadcore.scenario.model import Scenario
 
 from .files import COURSE, OF_COURSE, RECORD, SEAL, TURNING, VARIABLES, fields_of, seal
-from .hooks import as_seed, as_trial
 from .run import Run
 
 _RULE = "a run that Run.save wrote: a folder, or a file that ends in .nc"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore._shared.arrays import as_amount, complex_of
+from tadcore._shared.arrays import as_amount, as_seed, as_trial, complex_of
 from tadcore._shared.calls import public
 from tadcore.game.compiled import core_world, game_of
 from tadcore.game.course import Course, shapes
@@ -23,7 +23,7 @@ from tadcore.game.synthesis import GainKind, as_gains
 from tadcore.scenario.model import Scenario
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .hooks import Network, as_network, as_seed, as_trial
+from .outside import Network, as_network
 from .rules import refuse_between
 from .run import Run
 from .termination import Termination, as_termination

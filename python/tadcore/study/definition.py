@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tadcore._shared.arrays import Floats, as_flag, as_index
+from tadcore._shared.arrays import Floats, as_flag, as_index, as_seed
 from tadcore._shared.calls import public
 from tadcore._shared.threads import in_order
 from tadcore.errors import ScenarioError
@@ -61,7 +61,7 @@ class Definition:
                 raise ScenarioError(f'vary["{path}"]', value, f"given once only: {name} is there already")
             samplers[name] = as_sampler(f'vary["{path}"]', value)
         self._keep = as_keep(keep)
-        key = as_index("seed", seed, 2**64 - 1)
+        key = as_seed(seed)
         ending, looking = as_termination(termination), as_flag("passes", passes)
         refuse_between(sc, ending, passes=looking)
         self.plan = Plan(sc, samplers, key, design, ending, looking)

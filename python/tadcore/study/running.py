@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from typing import Any, NamedTuple
 
-from tadcore._shared.arrays import as_index
+from tadcore._shared.arrays import as_threads
 from tadcore._shared.files import as_path
 from tadcore.errors import ScenarioError
 from tadcore.sampling.design import CHUNK
@@ -44,7 +44,7 @@ class Options(NamedTuple):
 def gathered(study: Definition, options: Options) -> tuple[Rows, Stopping | None] | StudyPart:
     """Play what the store does not have; raises what `tadcore.Study.run` says."""
     executor, until, progress = options.executor, options.until, options.progress
-    threads = None if options.threads is None else as_index("threads", options.threads, 2**16, least=1)
+    threads = as_threads(options.threads)
     if executor is not None and not isinstance(executor, Executor):
         hint = ": client.get_executor()" if hasattr(executor, "get_executor") else ""
         raise ScenarioError("executor", executor, f"a concurrent.futures.Executor{hint}")

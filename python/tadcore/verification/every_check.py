@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from tadcore._shared.arrays import as_flag, as_index
+from tadcore._shared.arrays import as_flag, as_index, as_seed
 from tadcore._shared.calls import public
 from tadcore.errors import NoEquilibriumError, ScenarioError, TadcoreError
 from tadcore.game.equilibrium import solve_equilibrium
@@ -27,7 +27,6 @@ from .checks.nash import check_equilibrium
 from .checks.record import check_record, check_rows
 from .checks.steps import check_steps
 from .checks.turning import check_turning
-from .oracle.draws import as_seed
 from .report import Check, VerificationReport, combine, unresolved
 
 _MOST = 10**6

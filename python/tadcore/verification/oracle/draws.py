@@ -6,12 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tadcore._shared.arrays import as_index
-
-
-def as_seed(seed: Any) -> int:
-    """A seed of the generator: an int in [0, 2⁶⁴); raises `ScenarioError` for anything else."""
-    return as_index("seed", seed, 2**64 - 1)
+from tadcore._shared.arrays import as_seed
 
 
 def generator(seed: Any, draw: int) -> np.random.Generator:
