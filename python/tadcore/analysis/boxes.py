@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_real, refuse_where
-from tadcore._shared.files import as_path, write_whole
 from tadcore._shared.html import as_html
 from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
-from .maps import check_destination
+from .saving import save
 
 if TYPE_CHECKING:
     import xarray
@@ -184,18 +183,7 @@ class CertifiedMap:
         ScenarioError
             The file name ends in something else.
         """
-        target = as_path("path", path)
-        check_destination("path", target)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.suffix == ".nc":
-            write_whole(target, bytes(self.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
-            return target
-        from tadcore import plotting
-        from tadcore.plotting.tools.axes import for_files, root_figure
-
-        with for_files(), plotting.style():
-            plotting.save(root_figure(self.plot(**options)), target.with_suffix(""), formats=[target.suffix[1:]])
-        return target
+        return save(self, path, options)
 
     def _repr_html_(self) -> str:
         from tadcore.plotting.tools.inline import inline

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tadcore._shared.files import as_path, strange
+from tadcore._shared.files import as_path
+from tadcore._shared.netcdf import loaded
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
@@ -44,26 +45,9 @@ def load_certified_map(path: str | os.PathLike[str]) -> CertifiedMap:
     ScenarioError
         There is no such file, it is no certified map, or it is damaged.
     """
-    import xarray as xr
-
-    place = as_path("path", path)
-    name = os.fspath(path)
-    try:
-        found = strange(place)
-        if found is not None:
-            raise ScenarioError(name, found, _RULE)
-        with place.open("rb") as stream:
-            if stream.read(3) != b"CDF":
-                raise ScenarioError(name, "a file of another kind", _RULE)
-        with xr.open_dataset(place, engine="scipy", mmap=False, decode_cf=False) as opened:
-            data = opened.load()
+    place, name = as_path("path", path), os.fspath(path)
+    with loaded(place, name, _RULE, decode=False) as data:
         return _checked(data, name)
-    except OSError as error:
-        raise ScenarioError(name, error.strerror or str(error), _RULE) from None
-    except ScenarioError:
-        raise
-    except Exception as error:  # of the reader of netCDF: whatever damaged bytes lead it to
-        raise ScenarioError(name, "a damaged file", f"{_RULE} ({type(error).__name__}: {error})") from None
 
 
 def _checked(data: xarray.Dataset, name: str) -> CertifiedMap:

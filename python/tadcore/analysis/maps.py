@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tadcore._shared.calls import public
-from tadcore._shared.files import as_path, destination, write_whole
 from tadcore._shared.html import block
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
-from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind, kind_counts
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import label
@@ -28,13 +26,11 @@ from tadcore.simulation.batch import simulate_batch
 
 from .grids import BLOCK, Grid
 from .replays import refuse_random
+from .saving import save
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-
-
-_FIGURES = {".png", ".pdf", ".svg"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,18 +72,7 @@ class OutcomeMap:
         ScenarioError
             The file name ends in something else.
         """
-        target = as_path("path", path)
-        check_destination("path", target)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.suffix == ".nc":
-            write_whole(target, bytes(self.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
-            return target
-        from tadcore import plotting
-        from tadcore.plotting.tools.axes import for_files, root_figure
-
-        with for_files(), plotting.style():
-            plotting.save(root_figure(self.plot(**options)), target.with_suffix(""), formats=[target.suffix[1:]])
-        return target
+        return save(self, path, options)
 
     def _repr_html_(self) -> str:
         from tadcore.plotting.tools.inline import inline
@@ -181,11 +166,3 @@ def outcome_map(
             attrs={"title": f"Outcome by the start of {player}", **grid.attrs(), **provenance(sc)},
         ),
     )
-
-
-def check_destination(field: str, path: Path) -> None:
-    """Refuse a file name that tells nothing of what to write, and a place that cannot be written."""
-    if path.suffix not in _FIGURES | {".nc"}:
-        kinds = ", ".join(sorted(_FIGURES))
-        raise ScenarioError(field, str(path), f"the name of a figure ({kinds}) or of data (.nc)")
-    destination(path)

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from tadcore._shared.files import write_whole
+from tadcore._shared.netcdf import SUFFIX, netcdf
 from tadcore._shared.shares import estimate, percent, share
 from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from tadcore.statistics.radius import RadiusCurve
     from tadcore.study.study import Study
 
-_DATA = ".nc"
 _MOST_RADII = 100_000
 File = Annotated[str, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")]
 Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")]
@@ -57,7 +57,7 @@ def curve(
     radii of all players at once.
     """
     hush(quiet)
-    _check(out, (".png", ".pdf", ".svg", _DATA))
+    _check(out, (".png", ".pdf", ".svg", SUFFIX))
     from tadcore.analysis.radius import radius_curve
     from tadcore.analysis.replays import TEAM
     from tadcore.statistics.radius import RadiusCurve
@@ -87,8 +87,8 @@ def curve(
             say(f"there {shown}", indent=2)
     if out is None:
         return
-    if out.suffix == _DATA:
-        write_whole(out, bytes(found.to_xarray().to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+    if out.suffix == SUFFIX:
+        write_whole(out, netcdf(found.to_xarray()))
     else:
         from tadcore import plotting
         from tadcore.plotting.tools.axes import for_files, root_figure
@@ -131,7 +131,7 @@ def sweep(
     The draws are the same in every cell. A cell without an equilibrium says so.
     """
     hush(quiet)
-    _check(out, (_DATA,))
+    _check(out, (SUFFIX,))
     from tadcore.analysis.sweeps import sweep as run
     from tadcore.statistics.outcomes import excluding
 
@@ -152,7 +152,7 @@ def sweep(
             name, count, share, interval = shares.rows()[i]
             say(f"{name:<12} {count:>12}  {share} {interval}", indent=2)
     if out is not None:
-        write_whole(out, bytes(_plain(found.to_xarray()).to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
+        write_whole(out, netcdf(_plain(found.to_xarray())))
         say(f"written to {out}")
 
 

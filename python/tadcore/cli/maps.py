@@ -60,7 +60,8 @@ def draw_map(
 
     The other players start where the scenario has them.
     """
-    from tadcore.analysis.maps import check_destination, outcome_map
+    from tadcore.analysis.maps import outcome_map
+    from tadcore.analysis.saving import check_destination
 
     hush(quiet or as_json)
     check_destination("--out", out)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from tadcore._shared.files import as_path, destination, write_whole
+from tadcore._shared.netcdf import SUFFIX, netcdf
 from tadcore.errors import ScenarioError
 from tadcore.game.course import ARRAYS
 from tadcore.game.network import Edge
@@ -27,7 +28,6 @@ from tadcore.scenario.provenance import provenance
 from .termination import Termination
 from .variants import TURNING_WORDS, Variant, told
 
-SUFFIX = ".nc"
 RECORD = "run"
 """The attribute with all of a run that its dataset does not have."""
 
@@ -288,16 +288,12 @@ def save(run: Written, path: str | os.PathLike[str]) -> None:
     if place.suffix.lower() == SUFFIX:
         destination(place)
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(place, _netcdf(run))
+        write_whole(place, netcdf(run.dataset))
         return
     if any(map(str.isalpha, place.suffix)) and not place.is_dir():
         rule = f"a name that ends in {SUFFIX}, for one file, or has no suffix, for a folder"
         raise ScenarioError("path", os.fspath(path), rule)
     place.mkdir(parents=True, exist_ok=True)
-    write_whole(place / "run.nc", _netcdf(run))
+    write_whole(place / "run.nc", netcdf(run.dataset))
     run.scenario.to_toml(place / "scenario.toml")
     write_whole(place / "summary.json", json.dumps(summary_of(run), indent=2, allow_nan=False) + "\n")
-
-
-def _netcdf(run: Written) -> bytes:
-    return bytes(run.dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))

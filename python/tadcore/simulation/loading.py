@@ -11,7 +11,8 @@ import xarray as xr
 from pydantic import ValidationError
 
 from tadcore._shared.arrays import as_seed, as_trial, complex_of
-from tadcore._shared.files import as_path, strange
+from tadcore._shared.files import as_path
+from tadcore._shared.netcdf import loaded
 from tadcore.errors import ScenarioError
 from tadcore.game.course import ARRAYS, Course, shapes as course_shapes
 from tadcore.scenario.model import Scenario
@@ -20,7 +21,6 @@ from .files import COURSE, OF_COURSE, RECORD, SEAL, TURNING, VARIABLES, fields_o
 from .run import Run
 
 _RULE = "a run that Run.save wrote: a folder, or a file that ends in .nc"
-
 
 _BITS = ("adjacency", "seen", "sensor_up", "edge_up", "heard")
 
@@ -52,25 +52,9 @@ def load_run(path: str | os.PathLike[str]) -> Run:
     ...     print(tadcore.load_run(f"{folder}/run.nc").outcome)
     d1 intercepts the attacker at t = 1.395
     """
-    place = as_path("path", path)
-    name = os.fspath(path)
-    try:
-        file = place / "run.nc" if place.is_dir() else place
-        found = strange(file)
-        if found is not None:
-            raise ScenarioError(name, found, _RULE)
-        with file.open("rb") as stream:
-            begins = stream.read(3)
-        if begins != b"CDF":
-            raise ScenarioError(name, "a file of another kind", _RULE)
-        with xr.open_dataset(file, engine="scipy", mmap=False) as opened:
-            return _unpacked(opened.load(), name)
-    except OSError as error:
-        raise ScenarioError(name, error.strerror or str(error), _RULE) from None
-    except ScenarioError:
-        raise
-    except Exception as error:  # of the reader of netCDF: whatever damaged bytes lead it to
-        raise ScenarioError(name, "a damaged file", f"{_RULE} ({type(error).__name__}: {error})") from None
+    place, name = as_path("path", path), os.fspath(path)
+    with loaded(place, name, _RULE, in_folder="run.nc") as data:
+        return _unpacked(data, name)
 
 
 def _unpacked(data: xr.Dataset, name: str) -> Run:
