@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from tadcore import _core
 from tadcore._shared.arrays import Floats, as_index, as_threads
 from tadcore._shared.calls import public
-from tadcore._shared.limits import COORDINATE
 from tadcore._shared.progress import bar
 from tadcore._shared.text import one_of
 from tadcore.errors import ScenarioError
@@ -22,6 +21,7 @@ from tadcore.scenario.paths import label
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
 from .boxes import CertifiedMap
+from .grids import as_range
 from .loading import TITLE
 
 _TOGETHER = 1 << 13  # cells after which the keyboard is read and the progress bar moves
@@ -117,7 +117,7 @@ class Proving:
         self.scenario = sc = as_scenario(sc)
         _refuse(sc)
         self.player = player = one_of("player", label(player), sc.players)
-        low, high = np.transpose([_range("x", x), _range("y", y)]).tolist()
+        low, high = np.transpose([as_range("x", x), as_range("y", y)]).tolist()
         longer = max(high[0] - low[0], high[1] - low[1])
         self._least = longer / _FINE if resolution is None else _positive("resolution", resolution)
         self._threads = as_threads(threads)
@@ -193,16 +193,6 @@ def _refuse(sc: Scenario) -> None:
     if sc.world is not None:
         rule = "one without failures, disturbances and links for a certified map: the proof covers sight alone"
         raise ScenarioError("scenario", "a game with failures, disturbances or links", rule)
-
-
-def _range(field: str, given: Sequence[Any]) -> tuple[float, float]:
-    try:
-        low, high = map(float, given)
-    except (TypeError, ValueError):
-        raise ScenarioError(field, given, "(low, high)") from None
-    if not (COORDINATE.holds(low) and COORDINATE.holds(high) and low < high):
-        raise ScenarioError(field, given, f"(low, high) with low < high, each end {COORDINATE.words}")
-    return low, high
 
 
 def _positive(field: str, value: Any) -> float:

@@ -1,4 +1,4 @@
-"""The grid of one player's start that a map is played over."""
+"""Where one player may start: the grid that a map is played over, and the ranges of a region."""
 
 from __future__ import annotations
 
@@ -72,6 +72,17 @@ def _height(sc: Scenario, player: str, z: float | None) -> float | None:
     if sc.dim == 2:
         return None
     return float(sc.positions[sc.players.index(player), 2] if z is None else z)
+
+
+def as_range(field: str, given: Sequence[Any]) -> tuple[float, float]:
+    """The ends of an axis of a region, from (low, high); raises `ScenarioError`."""
+    try:
+        low, high = map(float, given)
+    except (TypeError, ValueError):
+        raise ScenarioError(field, given, "(low, high)") from None
+    if not (COORDINATE.holds(low) and COORDINATE.holds(high) and low < high):
+        raise ScenarioError(field, given, f"(low, high) with low < high, each end {COORDINATE.words}")
+    return low, high
 
 
 def _axis(field: str, given: Sequence[Any]) -> Floats:

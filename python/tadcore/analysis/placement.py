@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -18,6 +17,7 @@ from tadcore.statistics import outcome_names
 from tadcore.statistics.outcomes import as_level
 from tadcore.study.study import Study
 
+from .grids import as_range
 from .replays import Placed
 from .searches import fresh_study, judged, search
 
@@ -168,14 +168,4 @@ def _bounds(sc: Scenario, x: Any, y: Any, z: Any) -> list[tuple[float, float]]:
     if len(given) != sc.dim:
         rule = "a range (low, high) of heights" if sc.dim == 3 else "left out: this game is in the plane"
         raise ScenarioError("z", z, rule)
-    return [_range(axis, ends) for axis, ends in given.items()]
-
-
-def _range(field: str, given: Sequence[Any]) -> tuple[float, float]:
-    try:
-        low, high = map(float, given)
-    except (TypeError, ValueError):
-        raise ScenarioError(field, given, "(low, high)") from None
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise ScenarioError(field, given, "(low, high), finite, with low < high")
-    return low, high
+    return [as_range(axis, ends) for axis, ends in given.items()]
