@@ -73,6 +73,22 @@ UNPLAYED = len(OutcomeKind)
 """Their code, after those of the kinds of ends, where games differ from trial to trial."""
 
 
+def ending_names(n: int, *, games: bool = False) -> list[str]:
+    """What tables call the ends of games of n defenders: those without an interception, who intercepted, diverged.
+
+    Where every trial has a game of its own, ``games``, some may have no equilibrium.
+    """
+    team = (f"d{i + 1}" for i in range(n))
+    return ["timeout", "captured", *team, DIVERGED, *([NO_EQUILIBRIUM] if games else [])]
+
+
+def ending_codes(kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[np.bool_], n: int) -> NDArray[np.int32]:
+    """The place of each end in `ending_names`; one that diverged is nothing else."""
+    lost = OutcomeKind.INTERCEPTED + n
+    code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
+    return np.where(diverged, lost, np.where(kind == UNPLAYED, lost + 1, code)).astype(np.int32)
+
+
 def kind_counts(kind: NDArray[Any], diverged: NDArray[np.bool_]) -> dict[str, int]:
     """How many games ended in each way, by the name of the kind; those that diverged, if any, apart and last."""
     sound = kind[~diverged]

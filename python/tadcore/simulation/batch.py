@@ -14,10 +14,10 @@ from tadcore._shared.html import as_html
 from tadcore._shared.progress import pieces
 from tadcore.errors import ScenarioError
 from tadcore.game.compiled import core_world, game_of
-from tadcore.game.outcome import DIVERGED, Outcome, OutcomeKind, kind_counts
+from tadcore.game.outcome import Outcome, ending_codes, ending_names, kind_counts
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 
-from .rules import capture_rows, compare, refuse_between, visibility_rows
+from .rules import capture_rows, refuse_between, refuse_mismatched, visibility_rows
 from .termination import Termination, as_termination
 
 if TYPE_CHECKING:
@@ -69,12 +69,10 @@ class Batch:
         """One row for each game: ``outcome``, a categorical as in a study's table, and the arrays."""
         import pandas
 
-        names = ["timeout", "captured", *(f"d{i + 1}" for i in range(self.n)), DIVERGED]
-        code = np.where(self.kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + self.defender, self.kind)
-        code = np.where(self.diverged, len(names) - 1, code)
+        codes = ending_codes(self.kind, self.defender, self.diverged, self.n)
         columns = {"kind": self.kind, "defender": self.defender, "time": self.time, "diverged": self.diverged}
         columns |= {} if self.passed is None else {"passed": self.passed}
-        return pandas.DataFrame({"outcome": pandas.Categorical.from_codes(code, names), **columns})
+        return pandas.DataFrame({"outcome": pandas.Categorical.from_codes(codes, ending_names(self.n)), **columns})
 
     def _repr_html_(self) -> str:
         rows = [[name, f"{count:,}", ""] for name, count in self.counts().items()]
@@ -183,7 +181,7 @@ def simulate_batch(
     starts = as_positions(positions, (sc.n + 2, sc.dim), rows=True)
     sight = visibility_rows(sc, visibility_radii, len(starts))
     capture = capture_rows(sc, capture_radii, len(starts))
-    compare(starts, capture, sight, sc)
+    refuse_mismatched(sc, starts, sight, capture)
     key, first = as_seed(seed), as_trial("first_trial", first_trial)
     as_trial("first_trial", first + max(len(starts) - 1, 0))
     workers = as_threads(threads)

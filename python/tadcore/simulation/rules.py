@@ -44,8 +44,8 @@ def _rows(name: str, given: Floats, games: int, columns: int, meaning: str, fiel
     return np.ascontiguousarray(np.atleast_2d(given))
 
 
-def compare(starts: Floats, capture: Floats, sight: Floats, sc: Scenario) -> None:
-    """Whoever intercepts sees the attacker, σ < ζ; and rounding does not decide who is seen, nor who is heard."""
+def refuse_mismatched(sc: Scenario, starts: Floats, sight: Floats, capture: Floats) -> None:
+    """Refuse defenders who do not see whom they intercept, σ ≥ ζ, and starts at which rounding decides who is seen."""
     n = sc.n
     bad = ~sees_whom_it_intercepts(capture[:, :n], sight[:, :n])
     shown = np.broadcast_to(sight[:, :n], bad.shape)

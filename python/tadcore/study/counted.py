@@ -16,12 +16,11 @@ import pyarrow.parquet as pq
 
 from tadcore._shared.files import MOST
 from tadcore.errors import StoreError
-from tadcore.game.outcome import UNPLAYED, OutcomeKind
+from tadcore.game.outcome import UNPLAYED, OutcomeKind, ending_names
 from tadcore.statistics.tally import Tally
 
 from .place import Place
 from .plan import Plan
-from .table import outcome_names
 
 _NAME = re.compile(r"counts-(\d{10})-(\d{10})\.parquet")
 _LARGEST = 16 * MOST
@@ -61,7 +60,7 @@ def ranges_in(place: Place) -> list[tuple[int, int, str]]:
 def content_of(counted: Counted, plan: Plan, study: str) -> memoryview:
     """The bytes of the file: a function of the counts and of the study alone."""
     tally, sc = counted.tally, plan.scenario
-    names = outcome_names(sc.n, games=bool(plan.games))
+    names = ending_names(sc.n, games=bool(plan.games))
     lost = OutcomeKind.INTERCEPTED + sc.n
     code = np.where(tally.diverged, lost, np.where(tally.unplayed, lost + 1, tally.outcome))
     words = pa.DictionaryArray.from_arrays(pa.array(code.astype(np.int32)), pa.array(names))

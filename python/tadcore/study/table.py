@@ -22,7 +22,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from tadcore import _core
-from tadcore.game.outcome import DIVERGED, NO_EQUILIBRIUM, UNPLAYED, OutcomeKind
+from tadcore.game.outcome import UNPLAYED, OutcomeKind, ending_codes, ending_names
 from tadcore.sampling.design import CHUNK
 from tadcore.statistics.tally import Tally, steps_of
 
@@ -43,21 +43,10 @@ class Column:
     unit: str = ""
 
 
-def outcome_names(n: int, *, games: bool = False) -> list[str]:
-    """The categories of ``outcome``: the ends without an interception, the defenders, and games that diverged.
-
-    Where trials are games of their own, those without an equilibrium are the last.
-    """
-    team = (f"d{i + 1}" for i in range(n))
-    return ["timeout", "captured", *team, DIVERGED, *([NO_EQUILIBRIUM] if games else [])]
-
-
-def _outcome(kind: NDArray[Any], defender: NDArray[Any], diverged: NDArray[np.bool_], plan: Plan) -> pa.DictionaryArray:
-    lost = OutcomeKind.INTERCEPTED + plan.scenario.n
-    code = np.where(kind == OutcomeKind.INTERCEPTED, OutcomeKind.INTERCEPTED + defender, kind)
-    code = np.where(diverged, lost, np.where(kind == UNPLAYED, lost + 1, code))
-    names = outcome_names(plan.scenario.n, games=bool(plan.games))
-    return pa.DictionaryArray.from_arrays(code.astype(np.int32), pa.array(names))
+def _outcome(outcomes: Outcomes, plan: Plan) -> pa.DictionaryArray:
+    n = plan.scenario.n
+    codes = ending_codes(outcomes.kind, outcomes.defender, outcomes.diverged, n)
+    return pa.DictionaryArray.from_arrays(codes, pa.array(ending_names(n, games=bool(plan.games))))
 
 
 FIXED = {
@@ -68,7 +57,7 @@ FIXED = {
         pa.dictionary(pa.int32(), pa.string()),
         "how the game ended: timeout, captured (the attacker reached the target), the defender that intercepted, or "
         "diverged, however it then ended; no_equilibrium where a trial has a game of its own, without one",
-        lambda _, o, plan: _outcome(o.kind, o.defender, o.diverged, plan),
+        lambda _, o, plan: _outcome(o, plan),
     ),
     "kind": Column(
         pa.int8(),
@@ -166,8 +155,8 @@ def flaw(table: pa.Table, first: int, plan: Plan) -> str | None:
     last = (kind != OutcomeKind.TIMEOUT) | (np.abs(time - sc.horizon) <= 1e-9 * sc.horizon) | own
     one = np.where(kind == OutcomeKind.INTERCEPTED, (defender >= 0) & (defender < sc.n), defender == -1)
     known = np.isin(kind, [*OutcomeKind, *([UNPLAYED] if plan.games else [])])
-    names = outcome_names(sc.n, games=bool(plan.games))
-    same = _words(table, names) == np.asarray(_outcome(kind * known, one * defender, diverged, plan).indices)
+    names = ending_names(sc.n, games=bool(plan.games))
+    same = _words(table, names) == ending_codes(kind * known, one * defender, diverged, sc.n)
     when = "a time" if plan.between else "an instant of the grid"
     rules = {
         "trial": (table["trial"].to_numpy() == np.arange(first, first + len(kind)), "the number of its row"),
