@@ -9,7 +9,7 @@ import numpy as np
 from tadcore._shared.arrays import Floats, Integers
 from tadcore.errors import ScenarioError
 from tadcore.game.outcome import OutcomeKind
-from tadcore.scenario.quantities import setups
+from tadcore.scenario.quantities import core_setups
 from tadcore.statistics.outcomes import outcome_names
 from tadcore.study.study import Study
 
@@ -64,8 +64,7 @@ class NormalInputs:
         except ScenarioError as error:
             path, rule = error.field.partition(", trial")[0], "also far in the tail of its law: truncate the sampler"
             raise ScenarioError(f"a draw of {path}", error.value, f"{error.rule}, {rule}") from None
-        setup = setups(self._plan.scenario, self._plan.quantities, inputs)
-        starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
+        starts, sight, capture = core_setups(self._plan.scenario, self._plan.quantities, inputs)
         kind, defender, _, _, scores = self._plan.game.score_batch(
             starts, sight, capture, threads=self._threads, world=self._plan.world
         )

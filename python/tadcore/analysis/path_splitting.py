@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tadcore._shared.arrays import Floats, Integers
 from tadcore.errors import ScenarioError
 from tadcore.sampling.base import LOWEST, Block
-from tadcore.scenario.quantities import setups
+from tadcore.scenario.quantities import core_setups
 from tadcore.statistics.outcomes import outcome_names
 from tadcore.study.study import Study
 
@@ -179,8 +179,7 @@ class PathSearch(Search):
 
     def _play(self, inputs: Floats, stretches: list[Stretches]) -> tuple[Floats, Integers]:
         """The courses of the score, and the intercepting defender of each path or -1."""
-        setup = setups(self._plan.scenario, self._plan.quantities, inputs)
-        starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
+        starts, sight, capture = core_setups(self._plan.scenario, self._plan.quantities, inputs)
         flat = np.array([one for row in stretches for one in row], dtype=np.uint64)
         offsets = np.cumsum([0, *map(len, stretches)]).astype(np.uint64)
         world: Any = self._plan.world

@@ -19,7 +19,7 @@ from tadcore.sampling.base import Block, Sampler
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.numbers import game_quantities_of, games_of
 from tadcore.scenario.paths import normal
-from tadcore.scenario.quantities import Quantity, component, setups
+from tadcore.scenario.quantities import Quantity, component, core_setups, setups
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.batch import simulate_batch
 from tadcore.statistics.outcomes import indicators, outcome_names
@@ -148,13 +148,11 @@ def _joint(sampler: Sampler, components: int) -> Joint:
 
 def _events(sc: Scenario, varied: tuple[Quantity, ...], values: Floats, threads: int | None, *, show: bool) -> Floats:
     """Whether each trial ended in each outcome, last without an equilibrium, and when it ended."""
-    starts, sight, capture = setups(sc, varied, values)
     if not any(quantity.of_game for quantity in varied):
-        batch = simulate_batch(sc, starts, sight, capture, threads=threads, progress=show)
+        batch = simulate_batch(sc, *setups(sc, varied, values), threads=threads, progress=show)
         kind, defender, time, diverged = batch.kind, batch.defender, batch.time, batch.diverged
     else:
-        rows = [np.ascontiguousarray(np.atleast_2d(array)) for array in (starts, sight, capture)]
-        numbers = games_of(sc, varied, values)
+        rows, numbers = core_setups(sc, varied, values), games_of(sc, varied, values)
         found = [
             simulate_games(
                 sc.interaction,

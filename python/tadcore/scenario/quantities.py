@@ -109,3 +109,23 @@ def setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[
         else:
             arrays["position"][:, quantity.row, quantity.axis] = drawn[:, 0]
     return arrays["position"], arrays["visibility_radius"], arrays["capture_radius"]
+
+
+def core_setups(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> tuple[Floats, Floats, Floats]:
+    """The same as the core takes them: contiguous, radii of one row for each game or of one for all."""
+    starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setups(sc, varied, values))
+    return starts, sight, capture
+
+
+def with_values(sc: Scenario, varied: tuple[Quantity, ...], values: Floats) -> Scenario:
+    """The scenario of one game, from one number for each varied component: shape (1, components of all)."""
+    positions, sight, capture = setups(sc, varied, values)
+    arrays = {"position": positions, "visibility_radius": sight, "capture_radius": capture}
+    changes: dict[str, Any] = {}
+    column = 0
+    for quantity in varied:
+        own = values[0, column : column + quantity.components]
+        column += quantity.components
+        value = own if quantity.of_game else np.atleast_1d(arrays[quantity.field][0, quantity.row])
+        changes[quantity.owner] = float(value[0]) if len(value) == 1 else value.tolist()
+    return sc.replace(changes)

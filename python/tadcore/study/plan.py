@@ -23,7 +23,7 @@ from tadcore.sampling.base import Block, Sampler
 from tadcore.sampling.design import CHUNK, Design, generator, unit_points
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.numbers import GAMMA, games_of
-from tadcore.scenario.quantities import Quantity, setups
+from tadcore.scenario.quantities import Quantity, core_setups, setups
 from tadcore.simulation.rules import extents_of
 from tadcore.simulation.termination import Termination
 from tadcore.statistics.tally import Tally, steps_of
@@ -193,8 +193,7 @@ class Plan:
 
         It ends when ``stop`` is set.
         """
-        setup = setups(self.scenario, self.quantities, inputs)
-        starts, sight, capture = (np.ascontiguousarray(np.atleast_2d(array)) for array in setup)
+        starts, sight, capture = core_setups(self.scenario, self.quantities, inputs)
         continuous, passes = self.termination == "continuous", self.passes
         if self.games:
             interaction, numbers = self.scenario.interaction, games_of(self.scenario, self.quantities, inputs)

@@ -38,7 +38,7 @@ from tadcore._shared.html import block, line
 from tadcore.errors import OutOfMemoryError
 from tadcore.scenario.model import Scenario
 from tadcore.scenario.paths import ByPath, short
-from tadcore.scenario.quantities import setups
+from tadcore.scenario.quantities import with_values
 from tadcore.simulation.play import simulate
 from tadcore.simulation.run import Run
 from tadcore.statistics.stopping import Stopping
@@ -328,21 +328,7 @@ class StudyResult(Trials):
             drawn = np.array([[kept[name][0].as_py() for name in self.study.columns]])
         else:
             drawn = self.study.draw(row)
-        arrays = dict(
-            zip(
-                ("position", "visibility_radius", "capture_radius"),
-                setups(self.scenario, self.study.quantities, drawn),
-                strict=True,
-            )
-        )
-        changes: dict[str, Any] = {}
-        column = 0
-        for quantity in self.study.quantities:
-            own = drawn[0, column : column + quantity.components]
-            column += quantity.components
-            value = own if quantity.of_game else np.atleast_1d(arrays[quantity.field][0, quantity.row])
-            changes[quantity.owner] = float(value[0]) if len(value) == 1 else value.tolist()
-        return self.scenario.replace(changes)
+        return with_values(self.scenario, self.study.quantities, drawn)
 
     def replay(self, trial: int) -> Run:
         """One trial again, everything recorded; its outcome is bitwise the one in the table.
