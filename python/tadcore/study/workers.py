@@ -27,13 +27,9 @@ from .plan import Plan
 from .task import Played, Task
 
 _HERE, _ELSEWHERE = 0.25, 1.5  # seconds of work in a group
-_MOST, _MOST_COUNTED = (
-    64,
-    4096,
-)  # chunks in a group: of what comes back row by row, and of what is counted where it is played
-_UNKNOWN_WORKERS = 64
-_NEARLY = 4
-
+_MOST, _MOST_COUNTED = 64, 4096  # chunks in a group: of what comes back row by row, of what is counted where played
+_UNKNOWN_WORKERS = 64  # of an executor that does not say how many it has
+_NEARLY = 4  # a group becomes a whole part from a fourth of one on
 
 _Submitted: TypeAlias = tuple[Future[Any], Task | Join]
 

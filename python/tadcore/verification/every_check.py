@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from tadcore._shared.arrays import as_flag, as_index, as_seed
 from tadcore._shared.calls import public
 from tadcore.errors import NoEquilibriumError, ScenarioError, TadcoreError
-from tadcore.game.equilibrium import solve_equilibrium
+from tadcore.game.equilibrium import Equilibrium, solve_equilibrium
 from tadcore.scenarios.given import ScenarioLike, as_scenario
 from tadcore.simulation.play import simulate
 from tadcore.simulation.run import Run
@@ -93,15 +93,8 @@ def verify(
     True
     """
     given = sc_or_run if isinstance(sc_or_run, Run) else as_scenario(sc_or_run)
-    deviations = as_index("deviations", deviations, _MOST)
-    instants = as_index("instants", instants, _MOST)
-    starts = as_index("starts", starts, _MOST)
-    seed = as_seed(seed)
-    turning = as_flag("turning", turning)
-    if not isinstance(bound, int | np.integer) or bound not in (0, 1, 2):
-        raise ScenarioError("bound", bound, "0, 1 or 2: the order of the relaxation")
-    order = int(bound)
-    if order == 1:
+    asked = _Asked.checked(deviations, instants, starts, seed, bound, turning)
+    if asked.bound == 1:
         require_clarabel()
     if isinstance(given, Run) and given.variant:
         raise ScenarioError("sc_or_run", f"a run with {given.variant}", "a run of the paper's game, without any")
@@ -113,22 +106,41 @@ def verify(
         raise
     except TadcoreError as error:
         return combine(f"{sc.interaction}: not played", [_undecided("play", error)])
-    title = f"{sc.interaction}: {run.outcome}"
+    return _verified(run, equilibrium, asked)
 
-    def family(name: str, check: Callable[[], VerificationReport]) -> VerificationReport:
-        """The checks of one module, or one undecided check where they cannot be computed."""
-        try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not finite decides nothing
-                return check()
-        except (ArithmeticError, np.linalg.LinAlgError, TadcoreError) as error:
-            return _undecided(name, error)
 
+class _Asked(NamedTuple):
+    """What `verify` is asked for; its parameters."""
+
+    deviations: int
+    instants: int
+    starts: int
+    seed: int
+    bound: int
+    turning: bool
+
+    @classmethod
+    def checked(
+        cls, deviations: object, instants: object, starts: object, seed: object, bound: object, turning: object
+    ) -> _Asked:
+        """From anything; raises `ScenarioError`."""
+        counts = {"deviations": deviations, "instants": instants, "starts": starts}
+        whole = {name: as_index(name, count, _MOST) for name, count in counts.items()}
+        key, turns = as_seed(seed), as_flag("turning", turning)
+        if not isinstance(bound, int | np.integer) or bound not in (0, 1, 2):
+            raise ScenarioError("bound", bound, "0, 1 or 2: the order of the relaxation")
+        return cls(**whole, seed=key, bound=int(bound), turning=turns)
+
+
+def _verified(run: Run, equilibrium: Equilibrium, asked: _Asked) -> VerificationReport:
+    """Every check on a run that was played, or those that mean anything for it."""
+    sc, title = run.scenario, f"{run.scenario.interaction}: {run.outcome}"
     if run.diverged is not None and stops_early(run):
         why = f"the game {run.diverged}: it leaves the range of double precision after t = {run.times[-1]:g}"
-        return combine(title, [family("record", lambda: check_rows(run)), _undecided("play", TadcoreError(why))])
+        return combine(title, [_family("record", lambda: check_rows(run)), _undecided("play", TadcoreError(why))])
     parts = [
-        family("fne", lambda: check_equilibrium(sc, equilibrium, refine=True)),
-        family("record", lambda: check_record(run, equilibrium)),
+        _family("fne", lambda: check_equilibrium(sc, equilibrium, refine=True)),
+        _family("record", lambda: check_record(run, equilibrium)),
     ]
     whole = next((check for check in parts[1] if check.name == "record.arrays"), None)
     if whole is not None and not whole.ok:
@@ -137,32 +149,47 @@ def verify(
     if len(run.times) < 2:
         note = "the game is over at t = 0: there is no play to check"
         return _settled(combine(title, [*parts, VerificationReport("run", (), notes=(note,))]))
-    diverged = run.diverged
-    if sc.feedback == "receding":
+    of_gains = {"instants": asked.instants, "starts": asked.starts, "seed": asked.seed, "bound": asked.bound}
+    parts += [
+        _adapted(run, equilibrium, asked),
+        _family("consistency", lambda: check_consistency(run, equilibrium)),
+        _family("gains", lambda: check_gains(run, equilibrium, **of_gains)),
+        *([_family("turning", lambda: check_turning(run))] if asked.turning else []),
+        _family("geometry", lambda: check_geometry(run, seed=asked.seed)),
+        _family("decentral", lambda: check_decentral(run)),
+        _steps(run),
+    ]
+    return _settled(combine(title, parts))
+
+
+def _adapted(run: Run, equilibrium: Equilibrium, asked: _Asked) -> VerificationReport:
+    """The network-adapted equilibrium, where the theorems claim anything of it."""
+    if run.scenario.feedback == "receding":
         note = (
             "nafne: the theorems are of P(t) that solves its equation up to T; of a receding horizon nothing is claimed"
         )
-        parts.append(VerificationReport("nafne", (), notes=(note,)))
-    elif diverged is None:
-        parts.append(family("nafne", lambda: check_nafne(run, equilibrium, deviations=deviations, seed=seed)))
-    else:
-        parts.append(_undecided("nafne", ArithmeticError(f"the game {diverged}: deviations from it decide nothing")))
-    parts += [
-        family("consistency", lambda: check_consistency(run, equilibrium)),
-        family(
-            "gains",
-            lambda: check_gains(run, equilibrium, instants=instants, starts=starts, seed=seed, bound=order),
-        ),
-        *([family("turning", lambda: check_turning(run))] if turning else []),
-        family("geometry", lambda: check_geometry(run, seed=seed)),
-        family("decentral", lambda: check_decentral(run)),
-    ]
-    if sc.is_random:
+        return VerificationReport("nafne", (), notes=(note,))
+    if run.diverged is not None:
+        error = ArithmeticError(f"the game {run.diverged}: deviations from it decide nothing")
+        return _undecided("nafne", error)
+    return _family("nafne", lambda: check_nafne(run, equilibrium, deviations=asked.deviations, seed=asked.seed))
+
+
+def _steps(run: Run) -> VerificationReport:
+    """Smaller steps, where they are of the same game."""
+    if run.scenario.is_random:
         note = "steps: another step draws other failures and disturbances, so δ/2 and δ/4 are other games"
-        parts.append(VerificationReport("steps", (), notes=(note,)))
-    else:
-        parts.append(family("steps", lambda: check_steps(run)))
-    return _settled(combine(title, parts))
+        return VerificationReport("steps", (), notes=(note,))
+    return _family("steps", lambda: check_steps(run))
+
+
+def _family(name: str, check: Callable[[], VerificationReport]) -> VerificationReport:
+    """The checks of one module, or one undecided check where they cannot be computed."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not finite decides nothing
+            return check()
+    except (ArithmeticError, np.linalg.LinAlgError, TadcoreError) as error:
+        return _undecided(name, error)
 
 
 def _undecided(name: str, error: Exception) -> VerificationReport:
