@@ -5,6 +5,13 @@
 //! rounding and Gauss–Legendre quadrature of matching order integrates it exactly. Elsewhere large parts may cancel in
 //! a cost, so it is computed from S = ∫zzᵀdt in double-double arithmetic and rounded once, in the end.
 //!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | Q, F | [`Game::state_weights`] | running and terminal weights of each player on the rows of z |
+//! | R | `add_stiff_step`, `quadrature` | r_d, r_τ and r_a of [`Weights`](crate::game::Weights) |
+//! | C | `policy::closed_loop` | ż = Cz with the feedback of the instant before |
+//! | S = ∫zzᵀdt | `moments` | what a stiff step costs is tr(MS) |
+//!
 //! Costs carry all axes: they are the paper's own J, not a reduced factor. Over a step whose gains turn z and Jz are
 //! integrated together, J a quarter turn (see `policy::closed_loop`).
 
@@ -13,7 +20,7 @@ mod moments;
 mod quadrature;
 
 use double_double::{DoubleDouble, Numbers};
-use moments::{Motion, effort};
+use moments::{Moments, effort};
 use quadrature::weighted;
 
 use std::borrow::Cow;
@@ -41,7 +48,7 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
     let game = policy.game();
     let (size, dim, m) = (game.size(), record.dim, game.constrained());
     let grid = game.grid();
-    let (running, terminal) = (game.state_weights(false), game.state_weights(true));
+    let running = game.state_weights(false);
     let mut total = vec![0.0; running.len()];
     let mut stiff: Option<Vec<DoubleDouble>> = None;
     let mut rows = Vec::new();
@@ -78,23 +85,16 @@ pub fn costs(policy: &Policy, record: &Record, cancel: &CancelToken) -> Result<V
         if turn.is_some() {
             z = beside_turned(&z, size)?;
         }
-        let s = Motion::new(&rows, size, dim, cancel)?.over_step(&mut z, step)?;
+        let s = Moments::new(&rows, size, dim, cancel)?.over_step(&mut z, step)?;
         add_stiff_step(game, &running, &rows, &s, total, cancel)?;
     }
-    match &mut stiff {
+    let terminal = game.state_weights(true);
+    match stiff {
         None => {
             let z = relative(record, record.steps, size, dim);
             total.iter_mut().zip(terminal).for_each(|(j, f)| *j += 0.5 * weighted(&f, &z, dim));
         }
-        Some(stiff) => {
-            let z = exact_state(record, record.steps, size, dim)?;
-            for ((j, f), total) in stiff.iter_mut().zip(terminal).zip(&mut total) {
-                for (i, f) in f.iter().enumerate() {
-                    *j = (0..dim).map(|x| z.at(x * size + i)).fold(*j, |j, x| j.plus_product(x.times(x), half(*f)));
-                }
-                *total = j.plus(DoubleDouble::exact(*total)).hi;
-            }
-        }
+        Some(stiff) => add_stiff_end(&exact_state(record, record.steps, size, dim)?, &terminal, stiff, &mut total),
     }
     let finite = total.iter().all(|j| j.is_finite());
     if finite { Ok(total) } else { Err(RunError::Cost { time: record.time(grid) }) }
@@ -137,6 +137,17 @@ fn beside_turned(z: &Numbers, size: usize) -> Result<Numbers, Stopped> {
         both.set(3 * size + i, x);
     }
     Ok(both)
+}
+
+/// Adds to `total` what the stiff steps cost each player, and what the weights `terminal` make of the state at the end.
+fn add_stiff_end(z: &Numbers, terminal: &[Vec<f64>], stiff: Vec<DoubleDouble>, total: &mut [f64]) {
+    for ((mut j, weights), total) in stiff.into_iter().zip(terminal).zip(total) {
+        let (size, axes) = (weights.len(), z.nearest().len() / weights.len());
+        for (i, f) in weights.iter().enumerate() {
+            j = (0..axes).map(|x| z.at(x * size + i)).fold(j, |j, x| j.plus_product(x.times(x), half(*f)));
+        }
+        *total = j.plus(DoubleDouble::exact(*total)).hi;
+    }
 }
 
 /// Adds to `total` what a step with the moments S costs each player.

@@ -7,6 +7,14 @@
 //! S(2h) = S(h) + E(h) S(h) E(h)ᵀ, E(2h) = E(h)², from E = exp(Ch) by its own series, so that no step is too stiff. S is
 //! a sum of squares in which nothing cancels, as parts do in the Gramians of the costs, of which there are several besides.
 //! Digits are lost only where a mode grows by more than 10⁸ in a step and z hardly holds it.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | C = G − 1h | `Moments::new` | feedback rows less the attacker's; kept transposed |
+//! | z_j | `series` | coefficients of z on a piece |
+//! | S | `over_step`, `add_piece` | ∫ z zᵀ ds |
+//! | E(h) | `exponential` | exp(Ch) |
+//! | tr(rᵀr S) | [`effort`] | what a feedback row r costs |
 
 use super::double_double::{DoubleDouble, Numbers};
 use crate::cancel::CancelToken;
@@ -20,8 +28,8 @@ const EXPONENTIAL: usize = 24;
 /// What is left out of a series, relative to what is kept.
 const ROUNDING: f64 = 1e-33;
 
-/// ż = Cz over a step, in double-double arithmetic.
-pub(super) struct Motion<'a> {
+/// What integrates over steps of ż = Cz, in double-double arithmetic.
+pub(super) struct Moments<'a> {
     width: Width,
     n: usize,
     dim: usize,
@@ -32,7 +40,7 @@ pub(super) struct Motion<'a> {
     cancel: &'a CancelToken,
 }
 
-impl<'a> Motion<'a> {
+impl<'a> Moments<'a> {
     /// C of the feedback `rows` of the `players` and, the last, the attacker; z has `dim` axes. Rows of twice as many entries
     /// are on z and Jz, and so is C.
     pub fn new(rows: &[f64], players: usize, dim: usize, cancel: &'a CancelToken) -> Result<Self, Stopped> {
@@ -214,7 +222,7 @@ mod tests {
         let cancel = CancelToken::new();
         // Feedback of two players, and an attacker that stays.
         let rows = [c[0], c[1], c[2], c[3], 0.0, 0.0];
-        let motion = Motion::new(&rows, 2, 1, &cancel).expect("memory");
+        let motion = Moments::new(&rows, 2, 1, &cancel).expect("memory");
         let mut from = Numbers::zeros(2).expect("memory");
         (0..2).for_each(|i| from.set(i, DoubleDouble::exact(z[i])));
         let step = DoubleDouble::exact(1.0);
@@ -269,7 +277,7 @@ mod tests {
     fn a_loop_that_turns_is_integrated_beside_jz() {
         let cancel = CancelToken::new();
         let (rate, turn) = (0.3_f64, 40.0);
-        let motion = Motion::new(&[rate, turn, 0.0, 0.0], 1, 2, &cancel).expect("memory");
+        let motion = Moments::new(&[rate, turn, 0.0, 0.0], 1, 2, &cancel).expect("memory");
         // z = (3, 4), axis by axis with Jz = (−4, 3).
         let mut from = Numbers::zeros(4).expect("memory");
         [3.0, -4.0, 4.0, 3.0].into_iter().enumerate().for_each(|(i, x)| from.set(i, DoubleDouble::exact(x)));

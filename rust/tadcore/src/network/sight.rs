@@ -2,6 +2,12 @@
 //!
 //! Distances are compared by their squares against the largest double whose rounded root does not exceed the radius, so
 //! the answer is that of comparing the rounded distance itself, without a root in the loop.
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | ζ_i | `radius` of [`squared_reach`] | visibility radius; [`squared_reach`] gives the square it is compared by |
+//! | ‖z_i‖², ‖z_i − z_j‖² | [`squared_norm`], [`squared_distance`] | from player i to the attacker, to j |
+//! | 𝒜 | [`observe`] | who sees whom |
 
 use super::Topology;
 

@@ -8,6 +8,12 @@
 //!
 //! P_ii = P̂_ii, P_ij = P̂_iī / (c − 1) within a class, P_ij = P̂_ij between two, and with the target.
 //!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | c | the second of `Classes::classes` | members of a class |
+//! | P̂, its N | `Classes::game`, `size` | the smaller game |
+//! | i, ī | `Classes::row`, the next | the member that stands for itself; the mean of the others |
+//!
 //! It has an equilibrium exactly if the large one has: a solution of either makes one of the other.
 //!
 //! Source: ours; the equations are eq:Riccati and eq:RDE of the paper.

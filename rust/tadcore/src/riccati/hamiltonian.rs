@@ -6,7 +6,7 @@
 //! P⁺ − P = (Q h sinhc(√(SQ) h) + Cᵀ P − P Z) X⁻¹,
 //!
 //! where the two functions are power series in SQ: no square root is taken. The increment is symmetrised, so P is
-//! symmetric to the bit and a million small steps do not add up a million rounding errors of the size of P.
+//! bitwise symmetric and a million small steps do not add up a million rounding errors of the size of P.
 //!
 //! **No pole is jumped over.** P exists on (0, h] exactly if X(s) is regular for every s ≤ h, and
 //! ‖X(s) − I‖ ≤ (cosh ωs − 1) + ‖SP‖ sinh(ωs)/ω with ω² = ‖SQ‖. A step is taken only if this bound is at most ½;

@@ -1,6 +1,12 @@
 //! Interaction I2: one exact step of P by the exponential of the Hamiltonian matrix, as in [`super::hamiltonian`].
 //!
 //! $$P^+ - P = (F + C^\top P - P Z) X^{-1}, \qquad Z = C + E P, \quad X = I + Z.$$
+//!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | C, E, F | [`Level`]'s `c`, `e`, `f` | of one length of step, from the exponential |
+//! | Zᵀ, then Xᵀ | `z` | what is eliminated |
+//! | Gᵀ = F + PC − ZᵀP | `g` | the right-hand side, then (ΔP)ᵀ |
 
 use crate::cancel::{CancelToken, raised};
 use crate::simd::{Width, widened};

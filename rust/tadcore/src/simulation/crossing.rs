@@ -9,6 +9,13 @@
 //! A part whose chord stays further away than that has no crossing. One that is a chord to rounding is a quadratic
 //! equation. What lies between is halved again, the earlier half first: no crossing is missed, a tangency included.
 //!
+//! | symbol | here | meaning |
+//! |---|---|---|
+//! | w = δ 2⁻ʲ | `Part`, its `level` j | a part of the step |
+//! | w² max ‖z̈_i‖ / 8 | `Chord::off` | how far row i may leave its chord |
+//! | C²z | [`Motion`]'s `turning` | z̈ where a part begins |
+//! | σ² | `reach` | of the radius of row i |
+//!
 //! What is known of the motion on such parts is in [`super::motion`].
 
 pub(crate) use super::near::{clear, near};
