@@ -12,10 +12,10 @@ from scipy.linalg import expm
 import tadcore
 from tadcore import verification as v
 from tadcore.cli import app as cli
-from tadcore.verification.oracle.frozen import frozen_steps
 from tadcore.verification.oracle.matrices import matrices_of
 from tadcore.verification.oracle.objective import FullObjective
 from tadcore.verification.oracle.optimality import optimality
+from tadcore.verification.oracle.sampled_data import sampled_steps
 
 STIFF = {
     "one step": ("paper-i1", {"attacker.control_weight": 1e-12, "horizon": 1e-6, "step": 1e-6}),
@@ -145,7 +145,7 @@ def test_a_frozen_step_is_that_of_scipy(stiffness):
     C *= stiffness / np.abs(C).sum(axis=-1).max()
     W = rng.normal(size=(2, len(C), 4, 4))
     W = W + np.swapaxes(W, -1, -2)
-    transition, gramian = frozen_steps(C, 0.5, W)
+    transition, gramian = sampled_steps(C, 0.5, W)
     for (w, k), weight in zip(np.ndindex(2, len(C)), W.reshape(-1, 4, 4), strict=True):
         block = expm(0.5 * np.block([[-C[k].T, weight], [np.zeros((4, 4)), C[k]]]))
         exact = block[4:, 4:].T @ block[:4, 4:]
@@ -156,7 +156,7 @@ def test_a_frozen_step_is_that_of_scipy(stiffness):
 def test_a_very_stiff_step_has_a_closed_form():
     """C and W diagonal: ∫ exp(2cs) ds, where a block exponential overflows."""
     rates = -np.geomspace(1.0, 1e9, 5)
-    transition, gramian = frozen_steps(np.diag(rates)[None], 1.0, np.eye(5)[None, None])
+    transition, gramian = sampled_steps(np.diag(rates)[None], 1.0, np.eye(5)[None, None])
     assert np.allclose(np.diag(transition[0]), np.exp(rates), rtol=1e-6)
     assert np.allclose(np.diag(gramian[0, 0]), np.expm1(2.0 * rates) / (2.0 * rates), rtol=1e-6)
 

@@ -20,8 +20,8 @@ from tadcore.scenario.model import Scenario
 from tadcore.simulation.play import simulate
 from tadcore.simulation.run import Run
 from tadcore.verification.oracle.draws import generator
-from tadcore.verification.oracle.frozen import frozen_steps
 from tadcore.verification.oracle.matrices import matrices_of, stacked_rows
+from tadcore.verification.oracle.sampled_data import sampled_steps
 from tadcore.verification.report import Check, Claim, VerificationReport
 
 _LINE, _SAME, _DECIDED = 1e-10, 1e-8, 1e-11
@@ -201,7 +201,7 @@ def _rounding(run: Run, reach: float) -> float:
     rows = stacked_rows(solve_equilibrium(sc).feedback, sc.players)[: len(run.times)]
     rows[:, : scalar_gains(run).shape[1]] = scalar_gains(run)
     with np.errstate(over="ignore", invalid="ignore"):
-        transition, _ = frozen_steps(m.B @ rows[:-1], sc.horizon / sc.steps)
+        transition, _ = sampled_steps(m.B @ rows[:-1], sc.horizon / sc.steps)
         carried, grown = np.eye(m.size), 1.0
         for step in transition:
             carried = step @ carried

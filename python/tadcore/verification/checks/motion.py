@@ -1,4 +1,4 @@
-"""Motion and costs of a record: every step from its own row, by the exact solution of the frozen closed loop.
+"""Motion and costs of a record: every step from its own row, by the exact solution under zero-order hold.
 
 Checking each step by itself, and not the whole path, keeps the bounds tight in games whose states grow or shrink by
 many orders of magnitude.
@@ -10,8 +10,8 @@ import numpy as np
 
 from tadcore._shared.arrays import Floats
 from tadcore.simulation.run import Run
-from tadcore.verification.oracle.frozen import DOUBT, frozen_steps, stiffness
 from tadcore.verification.oracle.matrices import Matrices
+from tadcore.verification.oracle.sampled_data import DOUBT, sampled_steps, stiffness
 from tadcore.verification.report import Check, number
 
 from .claims import RECORD
@@ -47,7 +47,7 @@ def check_motion(run: Run, m: Matrices, rows: Floats) -> list[Check]:
         ``record.motion`` and ``record.attacker``; each names the first instant that a step does not lead to.
     """
     loop, step = closed_loops(m, rows), run.scenario.horizon / run.scenario.steps
-    transition, _ = frozen_steps(loop, step)
+    transition, _ = sampled_steps(loop, step)
     at, size = run.position, m.size
     z = at[:, :-1] - at[:, -1:]
     reach = np.abs(at).max(axis=(1, 2))
@@ -91,7 +91,7 @@ def check_costs(run: Run, m: Matrices, rows: Floats) -> Check:
     # the integrands, and the size of what cancels in them
     both = ((Q, effort), (np.abs(Q), np.abs(effort)))
     weights = [q + np.swapaxes(G, 1, 2) @ (e[:, None] * G) for Qs, es in both for q, e in zip(Qs, es, strict=True)]
-    _, gramian = frozen_steps(loop, step, np.stack(weights))
+    _, gramian = sampled_steps(loop, step, np.stack(weights))
     z = run.position[:, :-1] - run.position[:, -1:]
     running = 0.5 * np.einsum("kix,pkij,kjx->p", z[:-1], gramian, z[:-1], optimize=True)
     terminal = 0.5 * np.einsum("ix,pij,jx->p", z[-1], np.concatenate([F, np.abs(F)]), z[-1])

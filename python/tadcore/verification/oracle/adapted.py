@@ -126,7 +126,7 @@ class Adapted:
         self.gains = scalar_gains(run)[: self.length]
         self.start = run.position[0, :-1] - run.position[0, -1]
         # a stiff step is cut into pieces, each with its own nodes
-        stiff = float(np.abs(self.m.B @ self._frozen()).sum(axis=-1).max()) * sc.horizon / sc.steps
+        stiff = float(np.abs(self.m.B @ self._held()).sum(axis=-1).max()) * sc.horizon / sc.steps
         if not stiff <= _PIECES:  # no piece would be short enough: say so before computing any
             raise ArithmeticError(f"‖C‖δ = {stiff:.2g} where {_PIECES} pieces of a step can follow {_PIECES}")
         self.pieces = int(np.clip(np.ceil(8.0 * stiff), 1, _PIECES))
@@ -148,7 +148,7 @@ class Adapted:
         by_piece = np.stack(found[::-1], axis=2)
         return by_piece.reshape(len(by_piece), self.steps, *by_piece.shape[3:])
 
-    def _frozen(self) -> Floats:
+    def _held(self) -> Floats:
         """Rows in force over every step, shape (L, n + 2, N)."""
         rows = self.m.rows(self.grid[:, : self.length])
         rows[:, : self.gains.shape[1]] = self.gains
@@ -175,9 +175,9 @@ class Adapted:
 
     @cached_property
     def played(self) -> Floats:
-        """Rows in force in the run, shape (L · pieces, 1, n + 2, N): everything frozen at the step's start."""
-        frozen: Floats = np.repeat(self._frozen(), self.pieces, axis=0)[:, None]
-        return frozen
+        """Rows in force in the run, shape (L · pieces, 1, n + 2, N): everything held from the step's start."""
+        held: Floats = np.repeat(self._held(), self.pieces, axis=0)[:, None]
+        return held
 
     def states(self, rows: Floats, deviation: Deviation | None = None) -> tuple[Floats, Floats]:
         """The state at nodes and at the L + 1 instants under rows of shape (L · pieces, 1 or q, n + 2, N)."""
@@ -211,7 +211,7 @@ class Adapted:
         Parameters
         ----------
         sampled : bool
-            Whether the attacker's and the target's feedback is frozen on every step, as in the run, or follows P(t).
+            Whether the attacker's and the target's feedback is held on every step, as in the run, or follows P(t).
         deviation : Deviation, optional
             What one player adds to its control.
 

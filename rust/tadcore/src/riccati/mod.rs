@@ -58,7 +58,7 @@ use crate::memory::{spare, zeros};
 
 /// The solution of a game's Riccati equations on its grid.
 ///
-/// Every matrix is symmetric to the bit. Storage is (k, group, i, j): node after node, the groups of one node together.
+/// Every matrix is bitwise symmetric. Storage is (k, group, i, j): node after node, the groups of one node together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equilibrium {
     interaction: Interaction,

@@ -1,4 +1,4 @@
-"""One step of a frozen closed loop, exactly: its transition and the Gramians of quadratic integrands.
+"""One step of a closed loop under zero-order hold, exactly: its transition and the Gramians of quadratic integrands.
 
 Over a step ż = Cz with C constant, so
 
@@ -20,7 +20,7 @@ DOUBT = 64.0 * float(np.finfo(np.float64).eps)
 _DEGREE, _NODES, _MOST = 14, 8, 200
 
 
-def frozen_steps(C: Floats, step: float, W: Floats | None = None) -> tuple[Floats, Floats]:
+def sampled_steps(C: Floats, step: float, W: Floats | None = None) -> tuple[Floats, Floats]:
     """Transitions and Gramians of many steps.
 
     Parameters
