@@ -10,8 +10,7 @@ import typer
 
 from tadcore._shared.shares import estimate, percent
 
-from .many import File, Progress, read_study
-from .options import Json, Quiet, naming
+from .options import File, Json, Progress, Quiet, Threads, naming, read_study
 from .terminal import emit, hush, hushed, say
 
 Outcome = Annotated[
@@ -29,7 +28,7 @@ def best_start(
     player: Annotated[str, typer.Option(metavar="NAME", help="Whom to place: d1, d2, …, target or attacker.")] = "d1",
     outcome: Outcome = "intercepted",
     evaluations: Evaluations = 600,
-    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    threads: Threads = None,
     progress: Progress = True,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -61,7 +60,7 @@ def best_radii(
     total: Annotated[float, typer.Option(metavar="SUM", help="The sum of the defenders' visibility radii.")],
     outcome: Outcome = "intercepted",
     evaluations: Evaluations = 600,
-    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    threads: Threads = None,
     progress: Progress = True,
     as_json: Json = False,
     quiet: Quiet = False,

@@ -12,19 +12,16 @@ import typer
 from tadcore._shared.files import write_whole
 from tadcore._shared.netcdf import SUFFIX, netcdf
 from tadcore._shared.shares import estimate, percent, share
-from tadcore._shared.toml import STDIN, parse_toml, read_stdin
+from tadcore._shared.toml import parse_toml
 from tadcore.errors import ScenarioError
 
-from .options import Quiet, naming, writable
+from .options import File, Progress, Quiet, named_for, naming, read_study
 from .terminal import hush, hushed, say, sign_of_life
 
 if TYPE_CHECKING:
     from tadcore.statistics.radius import RadiusCurve
-    from tadcore.study.study import Study
 
 _MOST_RADII = 100_000
-File = Annotated[str, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")]
-Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")]
 
 
 def curve(
@@ -57,7 +54,7 @@ def curve(
     radii of all players at once.
     """
     hush(quiet)
-    _check(out, (".png", ".pdf", ".svg", SUFFIX))
+    named_for(out, (".png", ".pdf", ".svg", SUFFIX))
     from tadcore.analysis.radius import radius_curve
     from tadcore.analysis.replays import TEAM
     from tadcore.statistics.radius import RadiusCurve
@@ -87,7 +84,7 @@ def curve(
             say(f"there {shown}", indent=2)
     if out is None:
         return
-    if out.suffix == SUFFIX:
+    if out.suffix.lower() == SUFFIX:
         write_whole(out, netcdf(found.to_xarray()))
     else:
         from tadcore import plotting
@@ -131,7 +128,7 @@ def sweep(
     The draws are the same in every cell. A cell without an equilibrium says so.
     """
     hush(quiet)
-    _check(out, (SUFFIX,))
+    named_for(out, (SUFFIX,))
     from tadcore.analysis.sweeps import sweep as run
     from tadcore.statistics.outcomes import excluding
 
@@ -159,17 +156,3 @@ def sweep(
 def _plain(made: Any) -> Any:
     """The dataset with one coordinate for each dimension, which files can have."""
     return made.drop_vars([name for name in made.coords if name not in made.dims and name != "status"])
-
-
-def read_study(file: str) -> Study:
-    """The study of a file, or of standard input."""
-    from tadcore.study.study import Study
-
-    return Study.from_toml_string(read_stdin(), name="standard input") if file == STDIN else Study.from_toml(file)
-
-
-def _check(out: Path | None, known: tuple[str, ...]) -> None:
-    """Refuse, before anything is played, a name that tells nothing of what to write, and a place that is none."""
-    if out is not None and out.suffix not in known:
-        raise ScenarioError("--out", str(out), f"a name that ends in {', '.join(known)}")
-    writable("--out", out)

@@ -13,7 +13,7 @@ from tadcore._shared.shares import share
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
 
-from .options import Changes, Json, Quiet, Source, naming, read, writable
+from .options import Changes, Json, Progress, Quiet, Source, Threads, naming, read, writable
 from .terminal import emit, hush, hushed, say
 
 MOST_PLACES = 100_000
@@ -45,8 +45,8 @@ def draw_map(
         int, typer.Option(metavar="N", min=1, max=MOST_BOXES, help="With --certified: boxes to look at, at most.")
     ] = 200_000,
     time: Annotated[bool, typer.Option("--time", help="Draw when the game ends, not how.")] = False,
-    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
-    progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+    threads: Threads = None,
+    progress: Progress = True,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

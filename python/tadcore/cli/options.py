@@ -1,4 +1,4 @@
-"""What commands share: the scenario they take, changes to it, and folders they write into."""
+"""What commands share: their options, what is read for them, and where they write."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,9 @@ from tadcore._shared.text import similar
 from tadcore._shared.toml import STDIN, parse_toml, read_stdin
 from tadcore.errors import ScenarioError
 from tadcore.scenario.model import Scenario
+
+if TYPE_CHECKING:
+    from tadcore.study.study import Study
 
 FAILED = 1
 """The exit code of a game without an equilibrium, of one that diverges, and of a check that failed."""
@@ -35,6 +38,9 @@ Changes = Annotated[
     typer.Option("--set", metavar="PATH=VALUE", help="Change a field, such as d1.visibility_radius=2; repeatable."),
 ]
 
+File = Annotated[str, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")]
+Threads = Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")]
+Progress = Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else on standard output.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
@@ -69,6 +75,13 @@ def _refuse_what_is_not_there(source: str) -> None:
         return
 
 
+def read_study(file: str) -> Study:
+    """The study of a file, or of standard input."""
+    from tadcore.study.study import Study
+
+    return Study.from_toml_string(read_stdin(), name="standard input") if file == STDIN else Study.from_toml(file)
+
+
 @contextmanager
 def naming(**options: object) -> Iterator[None]:
     """Let an error about an argument name the option, and what was given to it, by the name of the argument."""
@@ -97,6 +110,13 @@ def writable(option: str, out: Path | None) -> None:
             destination(out)
         except OSError as error:
             raise ScenarioError(option, str(out), f"a file that can be written ({error.strerror})") from None
+
+
+def named_for(out: Path | None, known: tuple[str, ...]) -> None:
+    """Refuse, before anything is played, a name that tells nothing of what to write, and a place that is none."""
+    if out is not None and out.suffix.lower() not in known:
+        raise ScenarioError("--out", str(out), f"a name that ends in {', '.join(known)}")
+    writable("--out", out)
 
 
 def set_backend_aside() -> None:

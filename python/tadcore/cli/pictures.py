@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tadcore.errors import ScenarioError
-
-from .options import Changes, Quiet, Source, read, writable
+from .options import Changes, Quiet, Source, named_for, read
 from .terminal import hush, hushed, say, sign_of_life
 
 _FIGURES = (".png", ".pdf", ".svg")
@@ -34,7 +32,7 @@ def compare(
     Changes by --set are made to the first scenario only.
     """
     hush(quiet)
-    _suffix(out, _FIGURES)
+    named_for(out, _FIGURES)
     runs_of = read(scenario, changes), read(other, None)
     from tadcore import plotting
     from tadcore.plotting.tools.axes import for_files, root_figure
@@ -65,7 +63,7 @@ def animate(
       tadcore animate my.toml --out run.html --seconds 5
     """
     hush(quiet)
-    _suffix(out, _FILMS)
+    named_for(out, _FILMS)
     sc = read(scenario, changes)
     from tadcore.simulation.play import simulate
 
@@ -73,10 +71,3 @@ def animate(
     say(str(run.outcome))
     run.animate(seconds=seconds, fps=fps).save(out, progress=not hushed())
     say(f"written to {out}")
-
-
-def _suffix(out: Path, known: tuple[str, ...]) -> None:
-    """Refuse, before anything is played, a name that tells nothing of what to write, and a place that is none."""
-    if out.suffix.lower() not in known:
-        raise ScenarioError("--out", str(out), f"a name that ends in {', '.join(known)}")
-    writable("--out", out)

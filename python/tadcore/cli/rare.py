@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .many import File, Progress, read_study
-from .options import Json, Quiet, naming
+from .options import File, Json, Progress, Quiet, Threads, naming, read_study
 from .terminal import emit, hush, hushed, say
 
 
@@ -19,7 +18,7 @@ def rare(
     ] = "captured",
     error: Annotated[float, typer.Option(metavar="X", help="Relative standard error to aim at.")] = 0.1,
     level: Annotated[float, typer.Option(metavar="X", help="Confidence level of the interval.")] = 0.95,
-    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    threads: Threads = None,
     progress: Progress = True,
     as_json: Json = False,
     quiet: Quiet = False,

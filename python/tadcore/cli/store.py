@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import FAILED
+from .options import FAILED, Progress
 from .terminal import say
 
 store = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -24,7 +24,7 @@ def _top() -> None:
 @store.command(name="verify", short_help="Read everything that a store holds.")
 def verify_store(
     folder: Folder,
-    progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+    progress: Progress = True,
 ) -> None:
     """Read every file of a store: digests, counts, and that games can end so.
 

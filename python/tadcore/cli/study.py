@@ -10,10 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from tadcore._shared.shares import percent
-from tadcore._shared.toml import STDIN, read_stdin
 from tadcore.errors import ScenarioError
 
-from .options import Json, Quiet, naming
+from .options import File, Json, Progress, Quiet, Threads, naming, read_study
 from .terminal import complain, emit, hush, hushed, say
 
 _INTERRUPTED = 130
@@ -28,11 +27,11 @@ class Keeping(enum.StrEnum):
 
 
 def study(
-    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, or - for standard input.")],
+    file: File,
     store: Annotated[
         str, typer.Option(metavar="DIR", help="Where finished chunks are kept, a folder or a URL; continued if there.")
     ],
-    threads: Annotated[int | None, typer.Option(metavar="N", help="Threads; all cores by default.")] = None,
+    threads: Threads = None,
     table: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Keep the game's table of gains there: read before, written after."),
@@ -46,7 +45,7 @@ def study(
         typer.Option(metavar="I/N", help="Play part I, from 1, of N into DIR, to be merged with the others."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Only continue a study that DIR holds already.")] = False,
-    progress: Annotated[bool, typer.Option(help="Show a progress bar, where a terminal watches.")] = True,
+    progress: Progress = True,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -76,14 +75,10 @@ def study(
     from tadcore.statistics.outcomes import excluding
     from tadcore.study.manifest import Manifest
     from tadcore.study.part import as_part, place_of
-    from tadcore.study.study import Study
     from tadcore.study.where import as_place
 
     hush(quiet or as_json)
-    if str(file) == STDIN:
-        wanted = Study.from_toml_string(read_stdin(), name="standard input")
-    else:
-        wanted = Study.from_toml(file)
+    wanted = read_study(file)
     which = None if part is None else as_part(_numbers(part))
     if resume:
         Manifest.read(place_of(which, as_place("--store", store)))

@@ -18,6 +18,7 @@ from tadcore._shared.threads import cores
 from tadcore.analysis.certified import Proving
 from tadcore.analysis.replays import refuse_random
 from tadcore.game.compiled import game_of
+from tadcore.game.outcome import ending_codes, ending_names
 from tadcore.plotting.tools.outcomes import outcome_look
 from tadcore.scenario.model import Scenario
 from tadcore.simulation.rules import capture_rows, visibility_rows
@@ -36,7 +37,7 @@ _BUDGET = 200_000  # boxes: more than there are at this resolution
 Region: TypeAlias = tuple[float, float, float, float]
 """Left, right, bottom, top."""
 Codes: TypeAlias = NDArray[np.int64]
-"""Of every pixel, from below: the outcome, as an index of `outcomes_of`, or one of the two above."""
+"""Of every pixel, from below: the outcome, as an index of `ending_names`, or one of the two above."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +64,10 @@ class Picture:
         return np.asarray(packed[self.codes - UNKNOWN])
 
 
-def outcomes_of(sc: Scenario) -> tuple[str, ...]:
-    """The outcomes of a game in the order of their codes."""
-    return ("timeout", "captured", *sc.players[: sc.n], "diverged")
-
-
 def sampled(sc: Scenario, player: str, region: Region, stop: _core.Stop) -> Iterator[Picture]:
     """The outcome at the middle of every pixel, from below: first of coarse ones, then of all."""
     refuse_random(sc, "an outcome map", "tadcore.probability_map plays many trials from every start")
-    names = outcomes_of(sc)
+    names = tuple(ending_names(sc.n))
     codes = np.full((SIDE, SIDE), UNKNOWN, dtype=np.int64)
     for pixels in (_COARSE, 1):
         for first in range(0, SIDE, _STRIP):
@@ -94,13 +90,13 @@ def proved(sc: Scenario, player: str, region: Region, stop: _core.Stop) -> Itera
         budget=_BUDGET,
         threads=_threads(),
     )
-    names = outcomes_of(sc)
+    names = tuple(ending_names(sc.n))
     while not proving.done:
         proving.advance(_BOXES, stop)
         corners, kind, defender = proving.settled()
         edges = np.round((corners.reshape(-1, 2, 2) - [left, bottom]) / step).astype(np.int64)
         low, size = edges[:, 0], np.maximum(edges[:, 1] - edges[:, 0], 1)
-        code = np.where(kind < 0, UNDECIDED, np.where(kind == 2, 2 + defender, kind))
+        code = np.where(kind < 0, UNDECIDED, ending_codes(kind, defender, np.zeros_like(kind, dtype=bool), sc.n))
         codes = np.full((SIDE, SIDE), UNKNOWN, dtype=np.int64)
         for wide, high in np.unique(size, axis=0).tolist():
             alike = (size == [wide, high]).all(axis=1)
@@ -124,8 +120,7 @@ def _played(sc: Scenario, player: str, region: Region, pixels: int, first: int, 
     sight, capture = visibility_rows(sc, None, len(rows)), capture_rows(sc, None, len(rows))
     # The core itself, which can be stopped within a batch: one of a large team takes minutes.
     kind, defender, _, diverged, _ = game_of(sc).simulate_batch(rows, sight, capture, threads=_threads(), stop=stop)
-    code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
-    return np.where(diverged, sc.n + 2, code).astype(np.int64).reshape(len(y), len(x))
+    return ending_codes(kind, defender, diverged, sc.n).astype(np.int64).reshape(len(y), len(x))
 
 
 def _pixel(region: Region) -> NDArray[np.float64]:
