@@ -10,6 +10,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
+from tadcore.game.outcome import ending_codes, ending_names
 from tadcore.plotting.tools.axes import above
 from tadcore.plotting.tools.outcomes import outcome_look
 from tadcore.scenario.model import Scenario
@@ -79,10 +80,9 @@ def certified_map(found: Certified, ax: Axes | None = None, *, radii: bool = Tru
     corners = _corners(found)
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
     ax.add_patch(Rectangle((left, bottom), right - left, top - bottom, zorder=1.0, **_OPEN))
-    names = ["timeout", "captured", *found.scenario.players[: found.scenario.n]]
-    code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
+    code = ending_codes(kind, defender, np.zeros(kind.shape, dtype=bool), found.scenario.n)
     entries = []
-    for i, name in enumerate(names):
+    for i, name in enumerate(ending_names(found.scenario.n)):
         if np.any(code == i):
             fill = outcome_look(name).fill
             areas = PolyCollection(

@@ -214,7 +214,7 @@ def radius_curve(
         ax.axhline(0.0, color=ink(0.45), linewidth=0.6, zorder=1.2)
     ylabel = {
         "probability": "probability",
-        "difference": f"$P - P(\\mathrm{{{'reference'}}})$",
+        "difference": r"$P - P(\mathrm{reference})$",
         "slope": rf"$\mathrm{{d}}P/\mathrm{{d}}{whose}$",
     }
     ax.set(xlabel=f"${whose}$", ylabel=ylabel[quantity])

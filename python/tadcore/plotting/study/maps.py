@@ -9,6 +9,7 @@ from matplotlib.patches import Circle
 
 from tadcore._shared.arrays import Floats
 from tadcore._shared.calls import public
+from tadcore.game.outcome import ending_codes, ending_names
 from tadcore.plotting.tools.axes import above, colour_bar, new_axes
 from tadcore.plotting.tools.ground import ink
 from tadcore.plotting.tools.labels import Labels
@@ -27,7 +28,6 @@ Extent: TypeAlias = tuple[float, float, float, float]
 """Left, right, bottom and top, as Matplotlib's imshow takes them."""
 
 _HATCHED = 240  # grid points along an axis from which hatches are cut; finer ones would print as noise
-_KINDS = ("timeout", "captured")
 
 
 class OverStarts(Protocol):
@@ -129,10 +129,9 @@ def _edges(points: Floats, others: Floats) -> tuple[float, float]:
 def _areas(ax: Axes, found: OverStarts, x: Floats, y: Floats, extent: Extent) -> list[str]:
     """Fill and hatch the areas; returns the outcomes that occur, in the order of their codes."""
     kind, defender = found.dataset["kind"].values, found.dataset["defender"].values
-    names = [*_KINDS, *found.scenario.players[: found.scenario.n], "diverged"]
-    code = np.where(kind == 2, 2 + defender.astype(np.int64), kind)
-    if "diverged" in found.dataset:
-        code = np.where(found.dataset["diverged"].values, len(names) - 1, code)
+    diverged = found.dataset["diverged"].values if "diverged" in found.dataset else np.zeros(kind.shape, dtype=bool)
+    names = ending_names(found.scenario.n)
+    code = ending_codes(kind, defender, diverged, found.scenario.n)
     styles = [outcome_look(name) for name in names]
     colours = np.array([style.fill for style in styles])
     ax.imshow(colours[code], origin="lower", extent=extent, interpolation="nearest", zorder=1.0)
