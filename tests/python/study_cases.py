@@ -18,6 +18,13 @@ CHUNK = 8192
 FLAG = "TADCORE_TEST_LETHAL"
 
 
+def philox(seed, chunk, purpose, coordinates):
+    """The documented stream of one quantity, written out once more."""
+    counter = np.array([0, 0, 0, purpose], dtype=np.uint64)
+    bits = np.random.Philox(key=np.array([seed, chunk], dtype=np.uint64), counter=counter)
+    return np.random.Generator(bits).random((CHUNK, coordinates))
+
+
 def calm():
     """The paper's game on a short and coarse grid: a chunk takes a tenth of a second."""
     return tadcore.scenarios.load("paper-i1").replace({"horizon": 1.0, "step": 0.05})
