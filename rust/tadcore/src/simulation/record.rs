@@ -24,7 +24,8 @@ pub struct Record {
     /// L.
     pub steps: usize,
     /// How long after the instant before the last row the game ended, between two instants: 0 but for
-    /// [`Termination::Continuous`]. The last row is then the state there, under the feedback of that instant, which is held.
+    /// [`Termination::Continuous`](super::Termination::Continuous). The last row is then the state there, under the
+    /// feedback of that instant, which is held.
     pub after: f64,
     /// Capture radii that were entered between two instants, in the order of time.
     pub passes: Vec<Pass>,
