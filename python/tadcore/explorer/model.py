@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tadcore._shared.arrays import Floats, as_trial
 from tadcore.errors import ScenarioError, TadcoreError
+from tadcore.game.changes import changed_rows
 from tadcore.game.network import Edge, edges_of
 from tadcore.game.recorded import Recorded
 from tadcore.game.sound import until_divergence
@@ -140,7 +141,7 @@ class Explorer:
         """Indices of the instants that are drawn: few enough, changes of the network and both ends among them."""
         last = len(self.run.times) - 1
         even = np.linspace(0, last, min(last + 1, MOST_POINTS)).round().astype(np.intp)
-        jumps = np.flatnonzero((self.run.adjacency[1:] != self.run.adjacency[:-1]).any(axis=(1, 2))) + 1
+        jumps = changed_rows(self.run.adjacency)
         if len(jumps) > MOST_POINTS:
             return even
         return np.unique(np.concatenate([even, jumps, jumps - 1]))

@@ -29,6 +29,11 @@ class Interval(NamedTuple):
     edges: tuple[Edge, ...]
 
 
+def changed_rows(adjacency: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The rows, from 1 on, whose network is another than that of the row before."""
+    return np.flatnonzero((adjacency[1:] != adjacency[:-1]).any(axis=(1, 2))) + 1
+
+
 def changes_of(times: Floats, adjacency: NDArray[np.bool_], players: Sequence[str]) -> tuple[NetworkChange, ...]:
     """The initial network, then every instant at which it differs from the one before.
 
@@ -37,7 +42,7 @@ def changes_of(times: Floats, adjacency: NDArray[np.bool_], players: Sequence[st
     if not len(times):
         return ()
     changes = [NetworkChange(float(times[0]), edges_of(adjacency[0], players), ())]
-    for k in np.flatnonzero((adjacency[1:] != adjacency[:-1]).any(axis=(1, 2))) + 1:
+    for k in changed_rows(adjacency):
         before, after = adjacency[k - 1], adjacency[k]
         added, removed = edges_of(after & ~before, players), edges_of(before & ~after, players)
         changes.append(NetworkChange(float(times[k]), added, removed))

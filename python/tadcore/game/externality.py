@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .changes import changed_rows
 from .recorded import Recorded, scalar_gains
 from .synthesis import synthesize
 
@@ -38,9 +39,8 @@ def control_jumps(run: Recorded) -> xarray.Dataset:
     """
     import xarray as xr
 
-    sc, length = run.scenario, len(run.times) - 1
-    before, after = run.adjacency[: length - 1], run.adjacency[1:length]
-    steps = np.flatnonzero((before != after).any(axis=(1, 2))) + 1 if length > 1 else np.zeros(0, dtype=int)
+    sc, in_force = run.scenario, run.adjacency[: len(run.times) - 1]
+    steps = changed_rows(in_force)
     labels = list(sc.constrained)
     jump = np.zeros((len(steps), len(labels), sc.dim))
     own = np.zeros((len(steps), len(labels)), dtype=bool)

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tadcore._shared.arrays import Floats, as_adjacency, as_index
 from tadcore.errors import ScenarioError
+from tadcore.game.changes import changed_rows
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.network import VisibilityNetwork
 from tadcore.game.synthesis import synthesize
@@ -277,8 +278,7 @@ def check_decentral(run: Run) -> VerificationReport:
         minimum lies in another basin than the canonical start's, a note says so.
     """
     length = len(run.times) - 1
-    changed = np.flatnonzero((run.adjacency[1:length] != run.adjacency[: length - 1]).any(axis=(1, 2))) + 1
-    first = np.concatenate([[0], changed]).astype(int)
+    first = np.concatenate([[0], changed_rows(run.adjacency[:length])]).astype(int)
     chosen = first[np.unique(np.linspace(0, len(first) - 1, _SHOWN).astype(int))]
     worst, scalars, rounds, silent = 0.0, 0, 0, True
     notes = []

@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tadcore._shared.arrays import Floats
+from tadcore.game.changes import changed_rows
 from tadcore.game.equilibrium import solve_equilibrium
 from tadcore.game.recorded import scalar_gains
 from tadcore.game.synthesis import synthesize
@@ -181,8 +182,7 @@ def _below(bounds: Sequence[ThetaBound], recorded: Sequence[float], label: str) 
 def _instants(run: Run, most: int) -> NDArray[np.int_]:
     """The first instant under each network, then instants spread over the run, at most ``most``."""
     length = len(run.times) - 1
-    changed = np.flatnonzero((run.adjacency[1:length] != run.adjacency[: length - 1]).any(axis=(1, 2))) + 1
-    first = np.concatenate([[0], changed])
+    first = np.concatenate([[0], changed_rows(run.adjacency[:length])])
     if len(first) > most:  # a network that chatters
         first = first[np.linspace(0, len(first) - 1, most).astype(int)]
     spread = np.linspace(0, length - 1, max(most - len(first), 0)).astype(int)
