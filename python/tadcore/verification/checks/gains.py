@@ -102,19 +102,34 @@ def check_gains(
     sc, length = run.scenario, len(run.times) - 1
     m = matrices_of(sc)
     values = m.values(equilibrium.P)
-    label = "eq:optproblem" if sc.interaction == "I1" else "eq:optproblem2"
     remedy = "the solver stopped short: synthesize the instant again and report the scenario"
     unconverged = float(run.unconverged)
-    checks = [Check("gains.solver", unconverged, 0.0, True, remedy, label, "instants short of the tolerance")]
-
+    checks = [Check("gains.solver", unconverged, 0.0, True, remedy, _label(run), "instants short of the tolerance")]
     slopes = optimality(sc, m, values[:, :length], run.adjacency[:length], scalar_gains(run)[:length]).gradient
     at = int(np.argmax(slopes))
     steepest = float(slopes[at])
     remedy = "the gains are not critical points of Θ: they are not what the synthesis gives"
     where = f"t = {run.times[at]:.6g}"
     checks.append(Check("gains.gradient", steepest, CRITICAL, True, remedy, "eq:errgradient", where))
-
     chosen = _instants(run, instants)
+    checks += _local_minima(run, values, chosen, starts, seed)
+    share = run.certified / len(run.times)
+    measured = [Measurement("gains.certified", share, "share of rows whose gains are proved globally optimal")]
+    if bound:
+        bounded, found = _bounded(run, values, chosen) if bound == 1 else _bounded_by_proof(run, values)
+        checks += bounded
+        measured += found
+    return VerificationReport("gains", tuple(checks), tuple(measured))
+
+
+def _label(run: Run) -> str:
+    """Where the paper has the problem that the gains solve."""
+    return "eq:optproblem" if run.scenario.interaction == "I1" else "eq:optproblem2"
+
+
+def _local_minima(run: Run, values: Floats, chosen: NDArray[np.int_], starts: int, seed: int) -> list[Check]:
+    """Curvature in full blocks, and what random starts find there."""
+    sc, m = run.scenario, matrices_of(run.scenario)
     flattest, lower, worst, where_lower = np.inf, 0.0, 0.0, 0
     for k in chosen:
         objective = FullObjective(sc, m, values[:, k], run.adjacency[k], team=True)
@@ -128,39 +143,45 @@ def check_gains(
             lower = float(here - multistart(objective, x, starts, rng)) / max(here, 1e-10 * objective.theta(0.0 * x))
             if lower > worst:
                 worst, where_lower = lower, k
+    checks = []
     if np.isfinite(flattest):
         remedy = "a saddle of Θ: the gains can be improved in directions outside the Kronecker form"
         value = max(0.0, -flattest)
         detail = f"smallest over largest {flattest:.2g}, {len(chosen)} instants"
-        checks.append(Check("gains.curvature", value, _CURVATURE, True, remedy, label, detail))
+        checks.append(Check("gains.curvature", value, _CURVATURE, True, remedy, _label(run), detail))
     if starts:
         remedy = "a start in full blocks went lower: blocks that turn do better there, or a worse minimum was taken"
         where = f"{starts} starts at each of {len(chosen)} instants" + (
             f", t = {run.times[where_lower]:.6g}" if worst else ""
         )
-        checks.append(Check("gains.multistart", worst, _LOWER, True, remedy, label, where))
-    share = run.certified / len(run.times)
-    measured = [Measurement("gains.certified", share, "share of rows whose gains are proved globally optimal")]
-    if bound == 1:  # over all rows: Θ under the team criterion lies above it, too
-        bounds = [
-            bound_theta(FullObjective(sc, m, values[:, k], run.adjacency[k], dim=1), float(run.theta[k]))
-            for k in chosen.tolist()
-        ]
-        checks.append(_below(bounds, [float(run.theta[k]) for k in chosen], label))
-        found = f"largest (Θ - lower bound)/Θ of {len(bounds)} instants, {sum(b.tight for b in bounds)} of them tight"
-        measured.append(_gap(bounds, found))
-    elif bound == 2:
-        along = bound_along(run, values)
-        bounds = list(along.bounds.values())
-        if bounds:
-            checks.append(_below(bounds, [float(run.theta[k]) for k in along.bounds], label))
-            missed = max((b.relative_gap for b in bounds if b.lower is not None), default=0.0)
-            remedy = "gains with a lower Θ exist: report the scenario, since the search has missed them"
-            where = f"{sum(b.lower is not None for b in bounds)} of {len(bounds)} instants"
-            checks.append(Check("gains.missed", missed, _TIGHT, True, remedy, label, where))
-            measured.append(_gap(bounds, f"largest (Θ - proved bound)/Θ of {len(bounds)} instants"))
-        measured.append(Measurement("gains.proved", along.share, along.words))
-    return VerificationReport("gains", tuple(checks), tuple(measured))
+        checks.append(Check("gains.multistart", worst, _LOWER, True, remedy, _label(run), where))
+    return checks
+
+
+def _bounded(run: Run, values: Floats, chosen: NDArray[np.int_]) -> tuple[list[Check], list[Measurement]]:
+    """Bounds of order one, over all rows: Θ under the team criterion lies above them, too."""
+    sc, m = run.scenario, matrices_of(run.scenario)
+    bounds = [
+        bound_theta(FullObjective(sc, m, values[:, k], run.adjacency[k], dim=1), float(run.theta[k]))
+        for k in chosen.tolist()
+    ]
+    found = f"largest (Θ - lower bound)/Θ of {len(bounds)} instants, {sum(b.tight for b in bounds)} of them tight"
+    return [_below(bounds, [float(run.theta[k]) for k in chosen], _label(run))], [_gap(bounds, found)]
+
+
+def _bounded_by_proof(run: Run, values: Floats) -> tuple[list[Check], list[Measurement]]:
+    """Bounds of order two, wherever one is proved."""
+    along = bound_along(run, values)
+    bounds = list(along.bounds.values())
+    proved = Measurement("gains.proved", along.share, along.words)
+    if not bounds:
+        return [], [proved]
+    below = _below(bounds, [float(run.theta[k]) for k in along.bounds], _label(run))
+    missed = max((b.relative_gap for b in bounds if b.lower is not None), default=0.0)
+    remedy = "gains with a lower Θ exist: report the scenario, since the search has missed them"
+    where = f"{sum(b.lower is not None for b in bounds)} of {len(bounds)} instants"
+    check = Check("gains.missed", missed, _TIGHT, True, remedy, _label(run), where)
+    return [below, check], [_gap(bounds, f"largest (Θ - proved bound)/Θ of {len(bounds)} instants"), proved]
 
 
 def _gap(bounds: Sequence[ThetaBound], found: str) -> Measurement:

@@ -138,13 +138,31 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
     """
     sc = run.scenario
     rounded = _rounding(run, float(np.abs(run.position).max()))
-    checks, notes = [], []
-    world = sc.world
-    shaken, random = world is not None and world.shakes, sc.is_random
-    if sc.interaction == "I1" and sc.attacker.evasion == 0.0 and not shaken:
+    checks: list[Check] = []
+    notes: list[str] = []
+    if sc.interaction == "I1" and sc.attacker.evasion == 0.0 and not _is_shaken(sc):
         remedy = "a suicidal attacker and its target must stay on their line: P_τ or P_a reaches beyond the target"
         claim = Claim("geometry.line", _LINE, remedy, "thm:straight_line")
         checks.append(claim.judge(off_the_line(run), doubt=rounded))
+    delay, note = _delay(run)
+    checks += [delay] if delay is not None else []
+    notes += [note] if note else []
+    checks += _frames(run, generator(seed, 2**40))
+    if sc.is_random:
+        notes.append("failures and disturbances are drawn by player and axis: no symmetry exchanges these")
+    elif sc.n > 1:
+        checks.append(_relabelling(run, rounded))
+    return VerificationReport("geometry", tuple(checks), notes=tuple(notes))
+
+
+def _is_shaken(sc: Scenario) -> bool:
+    """Whether any player is disturbed."""
+    return sc.world is not None and sc.world.shakes
+
+
+def _delay(run: Run) -> tuple[Check | None, str]:
+    """Theorem delayproperty for every player that starts far enough from all others; or why for nobody."""
+    sc = run.scenario
     compared, differing = 0, 0
     apart = np.linalg.norm(sc.positions[:, None] - sc.positions, axis=-1)
     for i, player in enumerate(sc.constrained):
@@ -155,41 +173,44 @@ def check_geometry(run: Run, *, seed: int = 0) -> VerificationReport:
             first, same = radius_delay(sc, player, *radii, seed=run.seed, trial=run.trial)
             compared += first
             differing += not same
-    if compared:
-        remedy = "a radius acts before its first edge: something else than the network reads it"
-        where = f"{compared} instants in pairs of games of {len(sc.constrained)} players"
-        checks.append(Check("geometry.delay", float(differing), 0.0, True, remedy, "thm:delayproperty", where))
-    else:
-        notes.append("everyone with limited sight starts within a capture radius of someone: no radius to delay")
+    if not compared:
+        return None, "everyone with limited sight starts within a capture radius of someone: no radius to delay"
+    remedy = "a radius acts before its first edge: something else than the network reads it"
+    where = f"{compared} instants in pairs of games of {len(sc.constrained)} players"
+    return Check("geometry.delay", float(differing), 0.0, True, remedy, "thm:delayproperty", where), ""
 
-    margin = _margin(run)
-    rng = generator(seed, 2**40)
+
+def _frames(run: Run, rng: np.random.Generator) -> list[Check]:
+    """The game turned, mirrored and moved; only moved, where displacements would have to be turned, too."""
+    sc = run.scenario
     turn = np.linalg.qr(rng.normal(size=(sc.dim, sc.dim)))[0]
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     mirror = np.diag([-1.0] + [1.0] * (sc.dim - 1))
     shift = rng.normal(size=sc.dim) * float(np.abs(sc.positions).max())
     still, none = np.eye(sc.dim), np.zeros(sc.dim)
-    remedy = "the result depends on the frame: report this scenario"
-    for name, U, by in (("rotation", turn, none), ("reflection", mirror, none), ("translation", still, shift)):
-        if shaken and name != "translation":  # displacements would have to be turned too
-            continue
+    frames = [("rotation", turn, none), ("reflection", mirror, none), ("translation", still, shift)]
+    margin, remedy = _margin(run), "the result depends on the frame: report this scenario"
+    checks = []
+    for name, U, by in frames[-1:] if _is_shaken(sc) else frames:
         other_run = simulate(moved(sc, U, by), seed=run.seed, trial=run.trial)
         expected = run.position @ U.T + by
         gap = unlike(run, other_run, expected, run.outcome.defender)
         doubt = _rounding(run, float(np.abs(expected).max()))
         claim = Claim(f"geometry.{name}", _SAME, remedy, "eq:stateequation")
         checks.append(claim.judge(gap, doubt=doubt if margin > max(_DECIDED, doubt) else np.inf))
-    if random:
-        notes.append("failures and disturbances are drawn by player and axis: no symmetry exchanges these")
-    elif sc.n > 1:
-        order = list(range(sc.n))[::-1]
-        other_run = simulate(relabelled(sc, order))
-        winner = None if run.outcome.defender is None else order.index(run.outcome.defender)
-        gap = unlike(run, other_run, run.position[:, [*order, sc.n, sc.n + 1]], winner)
-        remedy = "the result depends on the order of the defenders: the synthesis found different minima"
-        claim = Claim("geometry.relabelling", _SAME, remedy, "eq:optproblem")
-        checks.append(claim.judge(gap, doubt=rounded if margin > max(_DECIDED, rounded) else np.inf))
-    return VerificationReport("geometry", tuple(checks), notes=tuple(notes))
+    return checks
+
+
+def _relabelling(run: Run, rounded: float) -> Check:
+    """The game with its defenders in the reversed order."""
+    sc = run.scenario
+    order = list(range(sc.n))[::-1]
+    other_run = simulate(relabelled(sc, order))
+    winner = None if run.outcome.defender is None else order.index(run.outcome.defender)
+    gap = unlike(run, other_run, run.position[:, [*order, sc.n, sc.n + 1]], winner)
+    remedy = "the result depends on the order of the defenders: the synthesis found different minima"
+    claim = Claim("geometry.relabelling", _SAME, remedy, "eq:optproblem")
+    return claim.judge(gap, doubt=rounded if _margin(run) > max(_DECIDED, rounded) else np.inf)
 
 
 def _rounding(run: Run, reach: float) -> float:
