@@ -194,7 +194,7 @@ fn a_quiet_world_is_none() {
                 let mut record = case.run(i, chances, termination);
                 let course = record.course.take().expect("a course");
                 assert_eq!(course.seen, record.networks);
-                assert!(course.disturbance.iter().all(|&x| x == 0.0));
+                assert!(course.displacement.iter().all(|&x| x == 0.0));
                 assert_eq!(record, case.run(i, None, termination));
             }
         }
@@ -281,8 +281,8 @@ fn radii_and_rates_share_their_draws() {
         let rows = one.states.len().min(other.states.len());
         // The last row of either repeats the network before, and is followed by no step.
         assert_eq!(one.states[..rows - 1], other.states[..rows - 1]);
-        assert_eq!(one.disturbance[..(rows - 1) * 10], other.disturbance[..(rows - 1) * 10]);
-        assert!(rows < 3 || one.disturbance[..10] != one.disturbance[10..20]);
+        assert_eq!(one.displacement[..(rows - 1) * 10], other.displacement[..(rows - 1) * 10]);
+        assert!(rows < 3 || one.displacement[..10] != one.displacement[10..20]);
     }
 }
 

@@ -168,7 +168,7 @@ def _course(sc: Scenario, record: _core.Record, seed: int, trial: int, *, from_o
         seen=seen,
         sensor_up=states(record.sensor_up, "sensor_up", otherwise=True),
         edge_up=states(record.edge_up, "edge_up", otherwise=True),
-        heard=states(record.link, "heard", otherwise=False),
-        displacement=still if record.disturbance is None else record.disturbance,
+        heard=states(record.heard, "heard", otherwise=False),
+        displacement=still if record.displacement is None else record.displacement,
         from_outside=from_outside,
     )

@@ -137,18 +137,18 @@ impl Record {
 
     /// Who heard whom, shape (L + 1, m, m), the diagonal false; `None` without a world.
     #[getter]
-    fn link<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<bool>>>> {
+    fn heard<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<bool>>>> {
         let Some(states) = self.states() else { return Ok(None) };
-        guarded(|| networks(py, states, |state| &state.links).map(Some))
+        guarded(|| networks(py, states, |state| &state.heard).map(Some))
     }
 
     /// Displacements after the step from each row, shape (L + 1, n + 2, dim), the last row 0; `None` without a world.
     #[getter]
-    fn disturbance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+    fn displacement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let Some(course) = self.record.course.as_ref().filter(|course| !course.states.is_empty()) else {
             return Ok(None);
         };
-        guarded(|| shaped(py, &course.disturbance, (self.rows(), self.players(), self.record.dim)).map(Some))
+        guarded(|| shaped(py, &course.displacement, (self.rows(), self.players(), self.record.dim)).map(Some))
     }
 
     /// Gain rows, shape (L + 1, m, N).

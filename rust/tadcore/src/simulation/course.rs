@@ -35,7 +35,7 @@ pub struct Course {
     /// What was up, and who was heard; empty without a world.
     pub states: Vec<State>,
     /// Displacements after the step from each row, (L + 1) × (n + 2) × dim, the last row 0; empty without a world.
-    pub disturbance: Vec<f64>,
+    pub displacement: Vec<f64>,
 }
 
 /// What was up at one instant, and who was heard.
@@ -46,7 +46,7 @@ pub struct State {
     /// Edges that were detected where they were within sight, m × N.
     pub edges: Topology,
     /// Who heard whom, m × m, the diagonal empty.
-    pub links: Topology,
+    pub heard: Topology,
 }
 
 impl Course {
@@ -63,22 +63,22 @@ impl Course {
         if let Some(present) = present {
             reserve(WHAT, &mut self.states, 1)?;
             self.states.push(present.state.clone());
-            append(WHAT, &mut self.disturbance, &vec![0.0; present.added.len()])?;
+            append(WHAT, &mut self.displacement, &vec![0.0; present.added.len()])?;
         }
         Ok(())
     }
 
     /// Notes what is added to the positions after the step from the last row.
     pub(super) fn note(&mut self, added: &[f64]) {
-        let last = self.disturbance.len() - added.len();
-        self.disturbance[last..].copy_from_slice(added);
+        let last = self.displacement.len() - added.len();
+        self.displacement[last..].copy_from_slice(added);
     }
 
     /// Takes the last row back.
     pub(super) fn pop(&mut self, row: usize) {
         self.seen.pop();
         self.states.pop();
-        self.disturbance.truncate(self.disturbance.len().saturating_sub(row));
+        self.displacement.truncate(self.displacement.len().saturating_sub(row));
     }
 }
 
@@ -103,7 +103,7 @@ impl Present {
         let mut walks = vec![Walk::default(); conditions.failures.len()];
         conditions.failures.begin(&draws, &mut walks);
         let (edges, links) = (Topology::complete(m, n), Topology::complete(m, m));
-        let state = State { sensors: Topology::complete(1, m), edges: edges.clone(), links: Topology::empty(m, m) };
+        let state = State { sensors: Topology::complete(1, m), edges: edges.clone(), heard: Topology::empty(m, m) };
         let added = vec![0.0; (n + 1) * dim];
         Ok(Self { conditions, draws, walks, due: 0, up: (edges, links), state, added, dim })
     }
@@ -127,9 +127,9 @@ impl Present {
         }
         seen.keep(&self.up.0);
         let Some(links) = &self.conditions.links else { return seen.clone() };
-        links.heard(z, self.dim, &mut self.state.links);
-        self.state.links.keep(&self.up.1);
-        links.told(seen, &self.state.links)
+        links.heard(z, self.dim, &mut self.state.heard);
+        self.state.heard.keep(&self.up.1);
+        links.told(seen, &self.state.heard)
     }
 
     /// Whether anybody is disturbed.
