@@ -14,10 +14,11 @@ sampler         values                                                         f
 `Cycle`         a list in its order, again and again: trial i takes i mod V    both
 ==============  =============================================================  ==============
 
-"For both" means positions and single numbers: coordinates, radii, weights, the horizon and the step. A plain sequence given to a study is a `Choice`. A frozen distribution of
-`scipy.stats` stands for itself: a scalar one is drawn for each coordinate independently. A callable ``f(rng, size)``
-returns ``size`` values (or ``size`` rows of coordinates) from a `numpy.random.Generator`; it must be a function of its
-arguments alone, and serves the random design only. With a wildcard path every player draws for itself.
+"For both" means positions and single numbers: coordinates, radii, weights, the horizon and the step. A plain sequence
+given to a study is a `Choice`. A frozen distribution of `scipy.stats` stands for itself: a scalar one is drawn for each
+coordinate independently. A callable ``f(rng, size)`` returns ``size`` values (or ``size`` rows of coordinates) from a
+`numpy.random.Generator`; it must be a function of its arguments alone, and serves the random design only. With a
+wildcard path every player draws for itself.
 """
 
 from __future__ import annotations
