@@ -165,10 +165,14 @@ def theta_bound(
     --------
     >>> import tadcore
     >>> sc = tadcore.scenarios.load("paper-i1")
-    >>> bound = tadcore.verification.theta_bound(sc, step=0, adjacency=[[0, 0, 0, 0], [1, 1, 1, 0], [0, 1, 1, 0]])
-    >>> bound.tight
+    >>> tadcore.verification.theta_bound(sc, step=0, adjacency=[[0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]]).tight
     True
-    >>> network = [[0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]]
+
+    Where order one leaves a gap, order two may close it:
+
+    >>> network = [[0, 0, 0, 0], [1, 1, 1, 0], [0, 1, 1, 0]]
+    >>> tadcore.verification.theta_bound(sc, step=0, adjacency=network).tight
+    False
     >>> tadcore.verification.theta_bound(sc, step=0, adjacency=network, order=2).proved
     True
     """
