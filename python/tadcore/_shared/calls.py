@@ -10,6 +10,12 @@ from typing import Any, ParamSpec, TypeVar
 from .arrays import as_flag
 from .text import similar
 
+_OF_ONE_GAME = dict.fromkeys(
+    ("gains", "mirror"),
+    "only tadcore.simulate and tadcore.synthesize have it: many games have scalar gains",
+)
+"""Options of single games that are asked of many."""
+
 Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
 
@@ -40,5 +46,5 @@ def public(function: Callable[Parameters, Returned]) -> Callable[Parameters, Ret
 
 def _unknown(function: str, name: str, known: list[str]) -> str:
     options = [option for option in known if option != "self"]
-    hint: Any = similar(name, options) or f"it takes {', '.join(options)}"
+    hint: Any = _OF_ONE_GAME.get(name) or similar(name, options) or f"it takes {', '.join(options)}"
     return f"{function}() has no option {name!r}; {hint}"

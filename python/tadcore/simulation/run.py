@@ -16,6 +16,7 @@ from tadcore.game.course import Contact, Course, EdgeOutage, Outage, contacts, e
 from tadcore.game.divergence import Divergence
 from tadcore.game.outcome import Outcome
 from tadcore.game.passes import Pass
+from tadcore.game.recorded import scalar_gains
 from tadcore.plotting.run.accessor import Plots
 from tadcore.scenario.model import Scenario
 
@@ -130,9 +131,11 @@ class Run:
 
         At every instant with a network in force, 0 where nobody, or everybody, knows everything. Both are the lowest Θ
         that a search finds; where that under "component" is the lower one, the other was missed, and the price is 0.
+        A run with turning gains is refused: both are among scalar gains.
         """
         from tadcore.game.compiled import game_of
 
+        scalar_gains(self)
         in_force = len(self.times) - 1
         return game_of(self.scenario).theta_price(np.arange(in_force), self.adjacency[:in_force])
 
