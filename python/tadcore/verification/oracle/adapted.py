@@ -76,7 +76,7 @@ class Index:
 
     @property
     def error(self) -> float:
-        """|J^Ad - V(0) - deviation| relative to `scale`."""
+        r""":math:`|J^{\mathrm{Ad}} - V(0) - \text{deviation}|` relative to `scale`."""
         return abs(self.value - self.initial - self.deviation) / max(self.scale, 1e-300)
 
 
