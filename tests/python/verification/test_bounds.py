@@ -43,7 +43,9 @@ def test_no_search_goes_below_it_in_reduced_gains_or_in_full_blocks(seed, n, int
     full = FullObjective(sc, m, m.values(tadcore.solve_equilibrium(sc).P)[:, k], network)
     assert full.dim == 2
     blocks = v.theta_bound(sc, step=k, adjacency=network, blocks=True)
-    assert blocks.value <= min(bound.value, v.multistart(full, full.blocks(found.rows), 1, rng)) + rounding
+    assert blocks.value <= min(found.theta, v.multistart(full, full.blocks(found.rows), 1, rng)) + rounding
+    # Both are bounds, but the best ones only as far as the solver goes.
+    assert blocks.value <= bound.value + 1e-8 * bound.scale
     if found.certified:
         assert abs(bound.relative_gap) < 1e-6
         assert bound.tight
